@@ -1,0 +1,1 @@
+//! The only wall around Embree.

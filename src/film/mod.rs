@@ -1,0 +1,5 @@
+//! Accumulation of splats, reconstruction filters, and image files.
+
+pub mod filter;
+
+pub use filter::Filter;

@@ -1,0 +1,23 @@
+//! relt renders images by replica-exchange light transport.
+//!
+//! Many Metropolis chains walk the unit cube of primary samples on ladders of inverse temperatures, from the
+//! uniform distribution (β = 0, plain path tracing) to the scene's luminance (β = 1); neighbours on a ladder
+//! exchange states. One progressive pass gives the image and its normalisation.
+//!
+//! The life of one mutation runs through the modules in this order: [`sample`] proposes a point, [`path`] maps
+//! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
+//! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
+//! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines.
+
+pub mod chain;
+pub mod cli;
+pub mod embree;
+pub mod film;
+pub mod load;
+pub mod math;
+pub mod path;
+pub mod render;
+pub mod rng;
+pub mod sample;
+pub mod scene;
+pub mod tempering;

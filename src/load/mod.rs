@@ -1,0 +1,1 @@
+//! Files to scene descriptions: one file a format.

@@ -1,0 +1,130 @@
+//! What a scene file says, free of any file format: plain data, validated, in world space.
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3};
+
+use super::{Mesh, Rgb, lights::Light, materials::Material};
+use crate::film::Filter;
+
+/// A scene as its file describes it. [`load`](crate::load) makes it, `Scene` is built from it.
+#[derive(Clone, Debug)]
+pub struct SceneDescription {
+    /// How long paths may become.
+    pub integrator: Integrator,
+    /// Where the picture is taken from.
+    pub camera: CameraDescription,
+    /// The picture.
+    pub film: FilmDescription,
+    /// Scattering functions, referred to by index.
+    pub materials: Vec<Material>,
+    /// Surfaces.
+    pub shapes: Vec<ShapeDescription>,
+    /// Lights that are not surfaces.
+    pub lights: Vec<Light>,
+    /// What the person should know but which does not keep the scene from rendering, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Limits on path length, with Mitsuba's meaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integrator {
+    /// Longest path in edges (1: lights seen directly, 2: one bounce); `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Number of edges from which on paths end by Russian roulette.
+    pub rr_depth: u32,
+}
+
+/// Which extent of the film the field of view spans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FovAxis {
+    /// The width.
+    X,
+    /// The height.
+    Y,
+    /// The diagonal.
+    Diagonal,
+    /// The smaller of width and height.
+    Smaller,
+    /// The larger of width and height.
+    Larger,
+}
+
+/// A pinhole camera. In its own coordinates it looks along +z, +y is up and +x is *left* (Mitsuba's convention).
+#[derive(Clone, Copy, Debug)]
+pub struct CameraDescription {
+    /// Camera to world; no scale other than a uniform one.
+    pub to_world: Affine3A,
+    /// Field of view in degrees, within (0, 180).
+    pub fov: f32,
+    /// What `fov` spans.
+    pub fov_axis: FovAxis,
+    /// Distance along the optical axis before which nothing is seen, > 0.
+    pub near_clip: f32,
+    /// Distance along the optical axis beyond which nothing is seen.
+    pub far_clip: f32,
+}
+
+/// Size and reconstruction filter of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmDescription {
+    /// Width in pixels, ≥ 1.
+    pub width: u32,
+    /// Height in pixels, ≥ 1.
+    pub height: u32,
+    /// How samples spread over pixels.
+    pub filter: Filter,
+}
+
+/// One surface.
+#[derive(Clone, Debug)]
+pub struct ShapeDescription {
+    /// The shape's id in the file, or a made-up one, for messages.
+    pub name: String,
+    /// Its geometry in world space.
+    pub geometry: ShapeGeometry,
+    /// What its two sides do.
+    pub sides: Sides,
+    /// Radiance emitted from the front, where it is a light.
+    pub emission: Option<Rgb>,
+}
+
+/// Geometry of a surface, in world space.
+#[derive(Clone, Debug)]
+pub enum ShapeGeometry {
+    /// Triangles; the front is where they run counter-clockwise (flipped already if the file says so).
+    Mesh(Arc<Mesh>),
+    /// An exact sphere; the front is the outside unless flipped.
+    Sphere {
+        /// Centre.
+        center: Vec3,
+        /// Radius, > 0.
+        radius: f32,
+        /// The front is the inside.
+        flipped: bool,
+    },
+    /// An exact flat disk.
+    Disk {
+        /// Centre.
+        center: Vec3,
+        /// Unit normal of the front.
+        normal: Vec3,
+        /// Radius, > 0.
+        radius: f32,
+    },
+}
+
+/// Materials of the two sides of a surface, as indices into [`SceneDescription::materials`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// One material for a surface that has a front (an opaque one is black from behind, a dielectric
+    /// transmits between the two sides).
+    One(u32),
+    /// A material for each side, each seeing the side it is on as its front (Mitsuba's `twosided`).
+    Two {
+        /// Of the front.
+        front: u32,
+        /// Of the back.
+        back: u32,
+    },
+}

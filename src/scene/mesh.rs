@@ -1,0 +1,49 @@
+//! Triangle meshes.
+
+use glam::{Vec2, Vec3};
+
+/// Triangles over shared vertices, in world space, already validated: every index is in range, every value
+/// finite, no triangle without area.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertex positions, followed by one vertex of padding that no triangle uses: Embree reads vertices as four
+    /// floats, so the last one must not end at the end of the allocation.
+    positions: Vec<Vec3>,
+    /// Unit shading normals, one a vertex, or empty where the faces are flat.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, one a vertex, or empty.
+    pub uvs: Vec<Vec2>,
+    /// Vertex indices of each triangle, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// A mesh of flat triangles; add `normals` and `uvs` afterwards where there are any.
+    pub fn new(mut positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
+        debug_assert!(triangles.iter().flatten().all(|&i| (i as usize) < positions.len()));
+        positions.push(Vec3::ZERO);
+        Mesh { positions, normals: Vec::new(), uvs: Vec::new(), triangles }
+    }
+
+    /// Vertex positions, without the padding.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions[..self.positions.len() - 1]
+    }
+
+    /// Vertex positions and the one vertex of padding behind them.
+    pub fn padded_positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The three corners of triangle `t`.
+    #[inline(always)]
+    pub fn corners(&self, t: u32) -> [Vec3; 3] {
+        self.triangles[t as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// Area of triangle `t`, in the square of the scene's unit, computed in f64.
+    pub fn area(&self, t: u32) -> f64 {
+        let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());
+        0.5 * (b - a).cross(c - a).length()
+    }
+}

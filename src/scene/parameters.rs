@@ -1,0 +1,55 @@
+//! Named parameters of one scene element, whatever file format they come from.
+//!
+//! Materials and lights read themselves from here, so that adding one is a single new file. The implementor
+//! remembers which names were asked for: those are what the element knows, and any other name in the file is a
+//! fault that lists them.
+
+use super::Rgb;
+
+/// A bag of named, typed values that knows where each came from.
+///
+/// A getter returns `None` when the name is absent *or* its value is faulty; faults are collected by the
+/// implementor, all of them, and shown to the person with their place in the file. So reading code uses a
+/// default and goes on.
+pub trait Parameters {
+    /// A single number.
+    fn float(&mut self, name: &str) -> Option<f32>;
+    /// A whole number.
+    fn integer(&mut self, name: &str) -> Option<i64>;
+    /// A truth value.
+    fn boolean(&mut self, name: &str) -> Option<bool>;
+    /// A string.
+    fn string(&mut self, name: &str) -> Option<String>;
+    /// A colour, given as one or as three numbers.
+    fn rgb(&mut self, name: &str) -> Option<Rgb>;
+    /// A point in the element's own coordinates.
+    fn point(&mut self, name: &str) -> Option<glam::Vec3>;
+    /// The element's `to_world` transform, identity where absent.
+    fn to_world(&mut self) -> glam::Affine3A;
+    /// Reports a fault of the named parameter (of the element as a whole where the name is absent).
+    fn fault(&mut self, name: &str, message: String);
+
+    /// A reflectance or transmittance: every channel finite and within 0…1; anything else is a fault.
+    fn reflectance(&mut self, name: &str, default: f32) -> Rgb {
+        match self.rgb(name) {
+            None => Rgb::splat(default),
+            Some(v) if v.is_finite() && v.min_element() >= 0.0 && v.max_element() <= 1.0 => v,
+            Some(v) => {
+                self.fault(name, format!("{name} is {v}; every channel must lie between 0 and 1"));
+                Rgb::splat(default)
+            }
+        }
+    }
+
+    /// A radiance or intensity: every channel finite and ≥ 0; anything else is a fault.
+    fn radiance(&mut self, name: &str, default: f32) -> Rgb {
+        match self.rgb(name) {
+            None => Rgb::splat(default),
+            Some(v) if v.is_finite() && v.min_element() >= 0.0 => v,
+            Some(v) => {
+                self.fault(name, format!("{name} is {v}; every channel must be finite and not negative"));
+                Rgb::splat(default)
+            }
+        }
+    }
+}
