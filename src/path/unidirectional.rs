@@ -8,7 +8,7 @@ use super::{
     vertex::{self, Carried, Decisions},
 };
 use crate::{
-    embree::{Hits, Rays, Width},
+    embree::{Hits, MISS, Rays, Width},
     rng::unit_f32,
     sample::Proposals,
     scene::{DiffuseProfile, FullProfile, Kernel, Profile, Rgb, Scene},
@@ -41,6 +41,9 @@ pub struct Workspace {
     rays: Rays,
     carried: Vec<Carried>,
     hits: Hits,
+    /// Rays that hit something: their indices and lanes.
+    hit_slots: Vec<u32>,
+    hit_lanes: Vec<u32>,
     /// Radiance and film position of every lane.
     radiance: Vec<Rgb>,
     film: Vec<[f32; 2]>,
@@ -101,9 +104,9 @@ fn evaluate<P: Profile>(
             break;
         }
         keep_hits::<P>(mapping.scene, workspace);
-        proposals.draw(mapping.layout.bounce(bounce), &workspace.lanes);
+        proposals.draw(mapping.layout.bounce(bounce), &workspace.hit_lanes);
         if let Some(block) = mapping.layout.choices(bounce) {
-            proposals.draw(block, &workspace.lanes);
+            proposals.draw(block, &workspace.hit_lanes);
         }
         shade::<P>(mapping, bounce, proposals, workspace);
         connect(mapping, workspace, out);
@@ -136,25 +139,19 @@ fn trace(mapping: &Mapping, bounce: u16, w: &mut Workspace, out: &mut Contributi
     out.rays += w.rays.len() as u64;
 }
 
-/// Adds the background to the paths that left the scene and keeps the others, in order.
+/// Adds the background to the paths that left the scene and lists the others.
 fn keep_hits<P: Profile>(scene: &Scene, w: &mut Workspace) {
-    let mut kept = 0;
+    w.hit_slots.clear();
+    w.hit_lanes.clear();
     for i in 0..w.lanes.len() {
-        if w.hits.get(i).is_none() {
-            w.radiance[w.lanes[i] as usize] += vertex::background::<P>(scene, &w.carried[i]);
-            continue;
+        let lane = w.lanes[i];
+        if w.hits.geometry[i] == MISS {
+            w.radiance[lane as usize] += vertex::background::<P>(scene, &w.carried[i]);
+        } else {
+            w.hit_slots.push(i as u32);
+            w.hit_lanes.push(lane);
         }
-        if kept != i {
-            w.lanes[kept] = w.lanes[i];
-            w.carried[kept] = w.carried[i];
-            w.rays.copy_within(i, kept);
-            w.hits.copy_within(i, kept);
-        }
-        kept += 1;
     }
-    w.lanes.truncate(kept);
-    w.carried.truncate(kept);
-    w.rays.truncate(kept);
 }
 
 /// At every hit: emission, a light to connect to, and the next edge. The edges of the paths that go on replace the
@@ -166,8 +163,8 @@ fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &
     w.shadow_rays.clear();
     w.shadow_contributions.clear();
     let mut kept = 0;
-    for i in 0..w.lanes.len() {
-        let lane = w.lanes[i];
+    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
+        let i = slot as usize;
         let carried = w.carried[i];
         let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
         let hit = w.hits.get(i).expect("misses are gone");
