@@ -75,8 +75,7 @@ impl<W: Default> Baseline<W> {
             let u = open_unit_f64(rng.words(Counter { purpose: Purpose::Step, ..counter }, 0)[0]);
             let proposed = self.evaluator.out.lanes[lane];
             let alpha = self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, record);
-            let count =
-                if self.evaluator.moves[lane] == Move::Small { &mut self.small } else { &mut self.large };
+            let count = if self.evaluator.moves[lane] == Move::Small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
         }
         self.steps += 1;

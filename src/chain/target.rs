@@ -43,6 +43,11 @@ pub struct Evaluator<W> {
 impl<W: Default> Evaluator<W> {
     /// For as many lanes as there are counters; all lanes rest at first.
     pub fn new(rng: Rng, law: StepLaw, counters: Vec<Counter>) -> Evaluator<W> {
+        Evaluator::with_workspace(rng, law, counters, W::default())
+    }
+
+    /// The same with a given workspace.
+    pub fn with_workspace(rng: Rng, law: StepLaw, counters: Vec<Counter>, workspace: W) -> Evaluator<W> {
         let lanes = counters.len();
         Evaluator {
             rng,
@@ -51,8 +56,13 @@ impl<W: Default> Evaluator<W> {
             counters,
             points: Points::new(lanes),
             out: Contributions::new(lanes),
-            workspace: W::default(),
+            workspace,
         }
+    }
+
+    /// What evaluations work in.
+    pub fn workspace(&mut self) -> &mut W {
+        &mut self.workspace
     }
 
     /// The source of random words.

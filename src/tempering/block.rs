@@ -154,8 +154,7 @@ impl<W: Default> Block<W> {
             let mut record = record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
             let small = self.evaluator.moves[lane] == Move::Small;
             let beta = self.ladder.betas()[k];
-            let alpha =
-                self.walkers.step(lane, beta, (&self.evaluator.points, lane), &proposed, u, &mut record);
+            let alpha = self.walkers.step(lane, beta, (&self.evaluator.points, lane), &proposed, u, &mut record);
             if small {
                 self.counts[k].accepted += alpha;
                 self.counts[k].proposed += 1;
@@ -191,8 +190,7 @@ impl<W: Default> Block<W> {
             self.counts[1].offered += 1;
             let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[from] };
             if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
-                let mut record =
-                    record(phase, 1, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+                let mut record = record(phase, 1, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
                 self.walkers.replace(lane, (&self.evaluator.points, from), &point, &mut record);
             }
         }
@@ -207,8 +205,7 @@ impl<W: Default> Block<W> {
             let base = ladder * chains;
             for hotter in (1 + (self.sweeps % 2) as usize..rungs - 1).step_by(2) {
                 let colder = hotter + 1;
-                let lanes =
-                    [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
+                let lanes = [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
                 let betas = self.ladder.betas();
                 let [h, c] = lanes.map(|lane| self.walkers.states[lane].ln_g);
                 let alpha = swap_acceptance(betas[hotter], h, betas[colder], c);
@@ -241,7 +238,9 @@ impl<W: Default> Block<W> {
     pub fn snapshot(&self, phase: Phase, recorder: &mut Recorder) -> Statistics {
         let mut tempered = self.tempered.clone();
         let (mut weights, mut deposited) = (self.weights.clone(), self.deposited.clone());
-        for (lane, state) in self.walkers.states.iter().enumerate().filter(|(lane, _)| self.walkers.pending[*lane] > 0.0) {
+        for (lane, state) in
+            self.walkers.states.iter().enumerate().filter(|(lane, _)| self.walkers.pending[*lane] > 0.0)
+        {
             let k = usize::from(self.rung[lane]);
             let mut record = record(phase, k, &mut tempered, &mut weights, &mut deposited, recorder);
             record(state, self.walkers.pending[lane]);

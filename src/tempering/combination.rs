@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn shares_of_all_rungs_sum_to_one_for_any_normalisers() {
-        let ladder = Ladder::new(vec![0.0, 0.2, 0.7, 1.0]).unwrap();
+        let ladder = Ladder::new(vec![0.0, 0.2, 0.7, 1.0]);
         let ln_zeta = [0.0, -3.0, 12.0, 5.0];
         let counts = [3.0, 1.0, 0.5, 1.0];
         let w = Weights::new(Combination::Balance, &ladder, &ln_zeta, &counts, 2.5);
@@ -115,14 +115,14 @@ mod tests {
 
     #[test]
     fn without_normalisers_the_uniform_rung_has_all_the_weight() {
-        let ladder = Ladder::even(2).unwrap();
+        let ladder = Ladder::even(2);
         let w = Weights::new(Combination::Balance, &ladder, &[0.0, f64::NEG_INFINITY], &[1.0, 1.0], 1.0);
         assert_eq!((w.uniform(3.0), w.tempered(1, 3.0)), (1.0, 0.0));
     }
 
     #[test]
     fn the_target_alone_divides_by_g() {
-        let ladder = Ladder::even(3).unwrap();
+        let ladder = Ladder::even(3);
         let w = Weights::new(Combination::Target, &ladder, &[0.0, 1.0, 2.0], &[1.0; 3], 4.0);
         assert_eq!((w.uniform(0.3), w.tempered(1, 0.3)), (0.0, 0.0));
         assert!((w.tempered(2, 0.3) - 4.0 * (-0.3f64).exp()).abs() < 1e-12);

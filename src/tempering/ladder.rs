@@ -6,53 +6,24 @@ pub struct Ladder {
     betas: Vec<f64>,
 }
 
-/// Why a list of inverse temperatures is no ladder.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LadderError {
-    /// Fewer than two rungs.
-    #[error("a ladder has at least the two rungs β = 0 and β = 1")]
-    TooShort,
-    /// More rungs than counters can name.
-    #[error("a ladder has at most {} rungs", Ladder::LONGEST)]
-    TooLong,
-    /// The first rung is not the uniform distribution.
-    #[error("the first inverse temperature is {0}; it must be 0, the uniform distribution")]
-    NotUniform(f64),
-    /// The last rung is not the target.
-    #[error("the last inverse temperature is {0}; it must be 1, the target itself")]
-    NotTarget(f64),
-    /// Two neighbours do not rise.
-    #[error("inverse temperatures must rise, but {1} follows {0}")]
-    NotRising(f64, f64),
-}
-
 impl Ladder {
     /// Most rungs of a ladder.
     pub const LONGEST: usize = 1024;
 
     /// A ladder of given inverse temperatures.
-    pub fn new(betas: Vec<f64>) -> Result<Ladder, LadderError> {
-        let (&[first, .., last], 2..) = (&betas[..], betas.len()) else { return Err(LadderError::TooShort) };
-        if betas.len() > Ladder::LONGEST {
-            return Err(LadderError::TooLong);
-        }
-        if first != 0.0 {
-            return Err(LadderError::NotUniform(first));
-        }
-        if let Some(pair) = betas.windows(2).find(|p| p[0].partial_cmp(&p[1]) != Some(std::cmp::Ordering::Less)) {
-            return Err(LadderError::NotRising(pair[0], pair[1]));
-        }
-        if last != 1.0 {
-            return Err(LadderError::NotTarget(last));
-        }
-        Ok(Ladder { betas })
+    ///
+    /// # Panics
+    /// If they do not rise strictly from 0 to 1 or are more than [`LONGEST`](Self::LONGEST); what people give is
+    /// checked, with better words, by [`Settings`](crate::render::Settings).
+    pub fn new(betas: Vec<f64>) -> Ladder {
+        assert!((2..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
+        assert!(betas[0] == 0.0 && betas[betas.len() - 1] == 1.0, "from {} to {}", betas[0], betas[betas.len() - 1]);
+        assert!(betas.windows(2).all(|pair| pair[0] < pair[1]), "inverse temperatures must rise: {betas:?}");
+        Ladder { betas }
     }
 
-    /// `rungs` equal steps from 0 to 1; 2 ≤ `rungs` ≤ [`Self::LONGEST`].
-    pub fn even(rungs: usize) -> Result<Ladder, LadderError> {
-        if rungs < 2 {
-            return Err(LadderError::TooShort);
-        }
+    /// `rungs` equal steps from 0 to 1; 2 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
+    pub fn even(rungs: usize) -> Ladder {
         Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1) as f64).collect())
     }
 
@@ -89,15 +60,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ladders_rise_from_the_uniform_distribution_to_the_target() {
-        assert_eq!(Ladder::even(3).unwrap().betas(), [0.0, 0.5, 1.0]);
-        assert_eq!(Ladder::new(vec![0.0]), Err(LadderError::TooShort));
-        assert_eq!(Ladder::new(vec![]), Err(LadderError::TooShort));
-        assert_eq!(Ladder::new(vec![0.1, 1.0]), Err(LadderError::NotUniform(0.1)));
-        assert_eq!(Ladder::new(vec![0.0, 0.9]), Err(LadderError::NotTarget(0.9)));
-        assert_eq!(Ladder::new(vec![0.0, 0.5, 0.5, 1.0]), Err(LadderError::NotRising(0.5, 0.5)));
-        assert!(matches!(Ladder::new(vec![0.0, f64::NAN, 1.0]), Err(LadderError::NotRising(..))));
-        assert_eq!(Ladder::even(1025), Err(LadderError::TooLong));
+    fn an_even_ladder_rises_from_the_uniform_distribution_to_the_target() {
+        assert_eq!(Ladder::even(2).betas(), [0.0, 1.0]);
+        assert_eq!(Ladder::even(3).betas(), [0.0, 0.5, 1.0]);
     }
 
     #[test]

@@ -15,5 +15,5 @@ mod normalisers;
 pub use block::{Block, LAYERS, Phase, RungCounts, Statistics, layer};
 pub use combination::{Combination, Weights};
 pub use histogram::Histogram;
-pub use ladder::{Ladder, LadderError, swap_acceptance};
+pub use ladder::{Ladder, swap_acceptance};
 pub use normalisers::{Estimate, Group, Normalisers, uniform_mean};
