@@ -1,1 +1,8 @@
-//! (being written)
+//! Mathematics that knows nothing of rendering: frames, warps with density and inverse, elementary functions.
+
+mod elementary;
+mod frame;
+pub mod warp;
+
+pub use elementary::{ln2_scaled_exp, offset_origin, sin_cos_turn};
+pub use frame::Frame;

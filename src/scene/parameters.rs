@@ -6,6 +6,15 @@
 
 use super::Rgb;
 
+/// A value that files give as a number or by name.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NumberOrName {
+    /// Given as a number.
+    Number(f32),
+    /// Given by name.
+    Name(String),
+}
+
 /// A bag of named, typed values that knows where each came from.
 ///
 /// A getter returns `None` when the name is absent *or* its value is faulty; faults are collected by the
@@ -22,6 +31,8 @@ pub trait Parameters {
     fn string(&mut self, name: &str) -> Option<String>;
     /// A colour, given as one or as three numbers.
     fn rgb(&mut self, name: &str) -> Option<Rgb>;
+    /// A number, or the name of one in a table.
+    fn number_or_name(&mut self, name: &str) -> Option<NumberOrName>;
     /// A point in the element's own coordinates.
     fn point(&mut self, name: &str) -> Option<glam::Vec3>;
     /// The element's `to_world` transform, identity where absent.

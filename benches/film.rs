@@ -1,0 +1,53 @@
+//! What a splat costs: spreading it over pixels and depositing it.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use relt::film::{Accumulator, Filter, Footprint, Splat, Splats};
+
+/// Splats a worker brings at a time.
+const BATCH: usize = 4096;
+
+fn deposit(c: &mut Criterion) {
+    let mut group = c.benchmark_group("film/deposit");
+    group.throughput(Throughput::Elements(BATCH as u64));
+    for size in [256, 1024] {
+        let film = Accumulator::new(size, size, 1, 20.0);
+        let splats: Vec<Splat> = (0..BATCH as u32)
+            .map(|i| {
+                let hash = i.wrapping_mul(0x9E37_79B9).rotate_left(13).wrapping_mul(0x85EB_CA6B);
+                let value = 2f32.powi((hash >> 29) as i32 - 4) * 1.3;
+                Splat { pixel: hash % (size * size), rgb: [value, value * 0.7, value * 0.1], weight: 0.3 }
+            })
+            .collect();
+        let mut waiting = Splats::new(1);
+        group.bench_function(BenchmarkId::from_parameter(format!("{size}²")), |b| {
+            b.iter(|| {
+                for splat in &splats {
+                    waiting.push(0, *splat);
+                }
+                film.deposit(&mut waiting);
+            });
+        });
+    }
+}
+
+fn spread(c: &mut Criterion) {
+    let mut group = c.benchmark_group("film/spread");
+    group.throughput(Throughput::Elements(1));
+    for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }] {
+        let footprint = Footprint::new(filter, 256, 256);
+        group.bench_function(BenchmarkId::from_parameter(format!("{filter:?}")), |b| {
+            let mut x = 0.1;
+            b.iter(|| {
+                x = (x * 1.37 + 3.1) % 255.0;
+                let mut sum = 0.0;
+                footprint.spread(black_box(x), black_box(255.0 - x), &mut |pixel, weight| sum += pixel as f32 * weight);
+                sum
+            });
+        });
+    }
+}
+
+criterion_group!(benches, deposit, spread);
+criterion_main!(benches);

@@ -1,0 +1,96 @@
+//! Files that appear whole or not at all.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, NamedTempFile};
+
+/// Why an image file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The system refused to write.
+    #[error("cannot write {path}: {reason}", path = .path.display())]
+    Write {
+        /// The file meant.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// The system refused to read, or the content is not what it should be.
+    #[error("cannot read {path}: {reason}", path = .path.display())]
+    Read {
+        /// The file meant.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl FileError {
+    /// A failure to write `path`.
+    pub fn write(path: &Path, reason: impl ToString) -> FileError {
+        FileError::Write { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// A failure to read `path`.
+    pub fn read(path: &Path, reason: impl ToString) -> FileError {
+        FileError::Read { path: path.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// Writes a file under a temporary name beside `path` and renames it once everything is on the disk: a reader,
+/// or a machine that loses its power, sees the old file or the new one, never a part.
+pub fn write_whole(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), String>,
+) -> Result<(), FileError> {
+    let failed = |reason: String| FileError::write(path, reason);
+    let mut temporary = create_beside(path)?;
+    let mut writer = BufWriter::new(temporary.as_file_mut());
+    content(&mut writer).map_err(failed)?;
+    writer.flush().map_err(|error| failed(plain(&error)))?;
+    drop(writer);
+    temporary.as_file().sync_all().map_err(|error| failed(plain(&error)))?;
+    temporary.persist(path).map_err(|error| failed(plain(&error.error)))?;
+    Ok(())
+}
+
+/// Finds out now whether [`write_whole`] will be able to write `path`; leaves nothing behind.
+pub fn check_writable(path: &Path) -> Result<(), FileError> {
+    create_beside(path).map(drop)
+}
+
+fn create_beside(path: &Path) -> Result<NamedTempFile, FileError> {
+    if path.is_dir() {
+        return Err(FileError::write(path, "it is a folder"));
+    }
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = Builder::new();
+    builder.prefix(".relt-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // A temporary file is its owner's alone by default; what it becomes should be as any other file.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => FileError::write(path, format_args!("there is no folder {}", folder.display())),
+        _ => FileError::write(path, plain(&error)),
+    })
+}
+
+/// The system's words without the name of the temporary file, which would only confuse.
+fn plain(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::PermissionDenied => "permission denied".into(),
+        io::ErrorKind::StorageFull => "the disk is full".into(),
+        io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".into(),
+        io::ErrorKind::NotADirectory => "a part of its path is not a folder".into(),
+        io::ErrorKind::InvalidFilename => "its name is too long or not allowed".into(),
+        _ => error.get_ref().map_or_else(|| error.to_string(), ToString::to_string),
+    }
+}

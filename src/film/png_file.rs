@@ -1,0 +1,55 @@
+//! PNG previews: 8 bits, sRGB, exposure 1.
+
+use std::io::BufWriter;
+use std::path::Path;
+
+use super::file::{FileError, write_whole};
+use super::image::Image;
+
+/// Writes the image as it looks on a screen: linear 1 is full brightness, what is brighter is clipped.
+pub fn write(path: &Path, image: &Image) -> Result<(), FileError> {
+    let bytes: Vec<u8> = image.pixels.as_flattened().iter().map(|&value| srgb_byte(value)).collect();
+    write_whole(path, |file| {
+        let mut encoder = png::Encoder::new(BufWriter::new(file), image.width, image.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+        let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
+        writer.write_image_data(&bytes).map_err(|error| error.to_string())?;
+        writer.finish().map_err(|error| error.to_string())
+    })
+}
+
+/// The byte of a linear value, IEC 61966-2-1: 12.92 v up to 0.0031308, 1.055 v^(1/2.4) − 0.055 above.
+pub fn srgb_byte(linear: f32) -> u8 {
+    let value = f64::from(linear).clamp(0.0, 1.0);
+    let encoded = if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * value.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spot_values_of_the_srgb_transfer() {
+        // 0.21404 is the linear value of code 127.5 (middle gray on screens), 0.5 gives 187.5.
+        let spots = [
+            (-1.0, 0),
+            (0.0, 0),
+            (0.000_15, 0),
+            (0.000_16, 1),
+            (0.003_130_8, 10),
+            (0.18, 118),
+            (0.213, 127),
+            (0.215, 128),
+            (0.5, 188),
+            (0.99, 254),
+            (1.0, 255),
+            (7.0, 255),
+        ];
+        for (linear, byte) in spots {
+            assert_eq!(srgb_byte(linear), byte, "linear {linear}");
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Which primary dimensions decide what.
+
+use crate::scene::Features;
+
+/// The primary dimensions of a camera path, laid out by bounce so that a small step in one decision moves that
+/// decision and no other.
+///
+/// Block 0 is the film position. Each bounce has one block (direction: 2, place on a light: 2) and, only where the
+/// scene needs any of them, a second one (lobe, light, roulette).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Bounces choose among lobes or lights.
+    choices: bool,
+    /// The bounce, counted from 0, from which on paths end by Russian roulette.
+    roulette_from: u16,
+    /// Longest path in edges.
+    max_depth: u16,
+    lobe_choice: bool,
+    light_choice: bool,
+}
+
+/// The longest path in edges where the scene sets no limit: bounded so that blocks can be numbered; with survival
+/// at most 0.95 a bounce, fewer than one path in 10⁷⁰ would be longer.
+const LIMIT: u16 = 4096;
+
+impl Layout {
+    /// The layout for that scene.
+    pub fn new(features: &Features) -> Layout {
+        let max_depth = features.integrator.max_depth.map_or(LIMIT, |d| d.min(u32::from(LIMIT)) as u16);
+        Layout {
+            choices: features.lobe_choice || features.light_choice(),
+            // a path has bounce + 1 edges when its roulette is played
+            roulette_from: features.integrator.rr_depth.saturating_sub(1).min(u32::from(LIMIT)) as u16,
+            max_depth,
+            lobe_choice: features.lobe_choice,
+            light_choice: features.light_choice(),
+        }
+    }
+
+    /// Longest path in edges.
+    #[inline(always)]
+    pub fn max_depth(&self) -> u16 {
+        self.max_depth
+    }
+
+    /// First block of a bounce: direction and place on a light.
+    #[inline(always)]
+    pub fn bounce(&self, bounce: u16) -> u16 {
+        let seconds = if self.choices { bounce } else { bounce.saturating_sub(self.roulette_from) };
+        1 + bounce + seconds
+    }
+
+    /// The block of a bounce that holds lobe, light and roulette, where there is one.
+    #[inline(always)]
+    pub fn choices(&self, bounce: u16) -> Option<u16> {
+        (self.choices || self.roulette(bounce)).then(|| self.bounce(bounce) + 1)
+    }
+
+    /// Whether roulette is played after that bounce.
+    #[inline(always)]
+    pub fn roulette(&self, bounce: u16) -> bool {
+        bounce >= self.roulette_from
+    }
+
+    /// Names of the dimensions that decide something at that bounce, for people.
+    pub fn describe(&self, bounce: u16) -> Vec<&'static str> {
+        let mut names = vec!["direction", "direction", "place on light", "place on light"];
+        if self.lobe_choice {
+            names.push("lobe");
+        }
+        if self.light_choice {
+            names.push("light");
+        }
+        if self.roulette(bounce) {
+            names.push("roulette");
+        }
+        names
+    }
+
+    /// The bounce from which on roulette is played, if paths get so long.
+    pub fn roulette_from(&self) -> Option<u16> {
+        (self.roulette_from + 1 < self.max_depth).then_some(self.roulette_from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_follow_each_other_without_gap_or_overlap() {
+        for choices in [false, true] {
+            for roulette_from in [0, 4, 100] {
+                let layout =
+                    Layout { choices, roulette_from, max_depth: 50, lobe_choice: choices, light_choice: false };
+                let mut next = 1;
+                for bounce in 0..50 {
+                    assert_eq!(layout.bounce(bounce), next);
+                    next += 1;
+                    if let Some(block) = layout.choices(bounce) {
+                        assert_eq!(block, next);
+                        next += 1;
+                    }
+                    assert_eq!(layout.choices(bounce).is_some(), choices || bounce >= roulette_from);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! What happens at one vertex of a camera path: emission, next-event estimation, scattering, roulette. The batch
+//! and the scalar mapping are both made of these, so that they agree to the bit.
+
+use glam::Vec3;
+
+use super::Layout;
+use crate::{
+    math::offset_origin,
+    rng::unit_f32,
+    sample::Block,
+    scene::{
+        LightSample, NO_LIGHT, Profile, Rgb, Scene, Surface,
+        materials::{Evaluation, Material, Scatter, ScatterSample},
+    },
+};
+
+/// What a path carries along its last edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Carried {
+    /// Product of f·cos/pdf and of roulette weights so far.
+    pub throughput: Rgb,
+    /// Density of the last direction with respect to solid angle; infinite after the eye and after delta lobes.
+    pub pdf: f32,
+    /// Product of the ratios of refractive indices, which roulette must not mistake for absorption.
+    pub eta: f32,
+}
+
+impl Carried {
+    pub const START: Carried = Carried { throughput: Rgb::ONE, pdf: f32::INFINITY, eta: 1.0 };
+}
+
+/// A light that is waiting for its shadow ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Connection {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub tfar: f32,
+    pub contribution: Rgb,
+}
+
+/// The next edge of a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub carried: Carried,
+}
+
+/// The primary samples of one bounce.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Decisions {
+    direction: [f32; 2],
+    light_place: [f32; 2],
+    lobe: f32,
+    light: f32,
+    roulette: Option<f32>,
+}
+
+impl Decisions {
+    #[inline(always)]
+    pub fn new(layout: &Layout, bounce: u16, first: Block, choices: Option<Block>) -> Decisions {
+        let [a, b, c, d] = first.map(unit_f32);
+        let [lobe, light, roulette, _] = choices.unwrap_or([0; 4]).map(unit_f32);
+        Decisions {
+            direction: [a, b],
+            light_place: [c, d],
+            lobe,
+            light,
+            roulette: layout.roulette(bounce).then_some(roulette),
+        }
+    }
+}
+
+/// Weight of the technique with density `a` against one with density `b`: a²/(a² + b²). Written so that neither
+/// square overflows, and so that an infinite `a` (the other technique cannot do it) gives 1.
+/// Source: Veach 1997, section 9.2.2.
+#[inline(always)]
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    if a == f32::INFINITY {
+        return 1.0;
+    }
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Radiance along an edge that left the scene.
+#[inline(always)]
+pub(super) fn background<P: Profile>(scene: &Scene, carried: &Carried) -> Rgb {
+    if P::FLAT_MESHES {
+        return Rgb::ZERO;
+    }
+    carried.throughput * scene.emitters.background() * power_heuristic(carried.pdf, scene.emitters.background_pdf())
+}
+
+/// Radiance that the surface emits back along the edge that hit it.
+#[inline(always)]
+pub(super) fn emission<P: Profile>(scene: &Scene, surface: &Surface, origin: Vec3, carried: &Carried) -> Rgb {
+    if surface.light == NO_LIGHT {
+        return Rgb::ZERO;
+    }
+    let mut weight = 1.0;
+    if carried.pdf != f32::INFINITY {
+        weight = power_heuristic(carried.pdf, scene.emitters.pdf::<P>(surface.light, origin, surface.p, surface.ng));
+    }
+    carried.throughput * scene.emitters.radiance(surface.light) * weight
+}
+
+/// Next-event estimation: the light's contribution if nothing stands between.
+#[inline(always)]
+pub(super) fn connection<P: Profile>(
+    scene: &Scene,
+    surface: &Surface,
+    carried: &Carried,
+    decisions: &Decisions,
+) -> Option<Connection> {
+    if !P::DIFFUSE && !surface.material.lobes().smooth {
+        return None;
+    }
+    let light: LightSample =
+        scene.emitters.sample::<P>(surface.p, surface.ng, decisions.light_place, decisions.light)?;
+    let Evaluation { value, pdf } = evaluate::<P>(surface.material, surface.wo, surface.frame.to_local(light.wi));
+    let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
+    (contribution != Rgb::ZERO).then_some(Connection {
+        origin: light.origin,
+        direction: light.wi,
+        tfar: light.tfar,
+        contribution,
+    })
+}
+
+/// Scattering and roulette: the next edge, unless the path ends here.
+#[inline(always)]
+pub(super) fn scatter<P: Profile>(surface: &Surface, carried: &Carried, decisions: &Decisions) -> Option<Edge> {
+    let ScatterSample { wi, weight, pdf, eta } =
+        sample::<P>(surface.material, surface.wo, decisions.direction, decisions.lobe)?;
+    let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta };
+    if let Some(u) = decisions.roulette {
+        let survival = (next.throughput.max_element() * next.eta * next.eta).min(0.95);
+        if u >= survival {
+            return None;
+        }
+        next.throughput /= survival;
+    }
+    if next.throughput == Rgb::ZERO {
+        return None;
+    }
+    let direction = surface.frame.to_world(wi);
+    let side = if surface.ng.dot(direction) >= 0.0 { surface.ng } else { -surface.ng };
+    Some(Edge { origin: offset_origin(surface.p, side), direction, carried: next })
+}
+
+#[inline(always)]
+fn sample<P: Profile>(material: &Material, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
+    match material {
+        Material::Diffuse(diffuse) => diffuse.sample(wo, u, choice),
+        _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
+        other => other.sample(wo, u, choice),
+    }
+}
+
+#[inline(always)]
+fn evaluate<P: Profile>(material: &Material, wo: Vec3, wi: Vec3) -> Evaluation {
+    match material {
+        Material::Diffuse(diffuse) => diffuse.evaluate(wo, wi),
+        _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
+        other => other.evaluate(wo, wi),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heuristic_weights_of_two_techniques_sum_to_one() {
+        for (a, b) in [(1.0, 2.0), (1e30, 1e-30), (1e-20, 3e20), (5.0, 0.0)] {
+            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0f32).abs() < 1e-6, "{a} {b}");
+        }
+        assert_eq!(power_heuristic(f32::INFINITY, 3.0), 1.0);
+        assert_eq!(power_heuristic(3.0, f32::INFINITY), 0.0);
+    }
+}

@@ -1,0 +1,140 @@
+//! What a scene needs, and so what can be left out.
+
+use std::collections::BTreeMap;
+
+use super::description::{Integrator, SceneDescription, ShapeGeometry};
+use super::lights::Light;
+
+/// What a scene uses. Dimensions, kernels and messages follow from it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features {
+    /// Kinds of materials in use, with how many of each.
+    pub materials: BTreeMap<&'static str, usize>,
+    /// Some material has a lobe with a finite density.
+    pub smooth_lobes: bool,
+    /// Some material has delta lobes.
+    pub delta_lobes: bool,
+    /// Some material chooses among several lobes, which takes a primary dimension.
+    pub lobe_choice: bool,
+    /// Surfaces that emit.
+    pub area_lights: usize,
+    /// Point lights.
+    pub point_lights: usize,
+    /// Lights at infinity.
+    pub infinite_lights: usize,
+    /// Triangle meshes, those with shading normals, spheres, disks.
+    pub shapes: ShapeCounts,
+    /// Triangles of all meshes.
+    pub triangles: usize,
+    /// Limits on path length.
+    pub integrator: Integrator,
+}
+
+/// How many shapes of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShapeCounts {
+    /// Meshes without shading normals.
+    pub flat_meshes: usize,
+    /// Meshes with shading normals.
+    pub smooth_meshes: usize,
+    /// Exact spheres.
+    pub spheres: usize,
+    /// Exact disks.
+    pub disks: usize,
+}
+
+impl Features {
+    /// What that scene needs.
+    pub fn of(description: &SceneDescription) -> Features {
+        let mut materials = BTreeMap::new();
+        for m in &description.materials {
+            *materials.entry(m.name()).or_insert(0) += 1;
+        }
+        let lobes: Vec<_> = description.materials.iter().map(|m| m.lobes()).collect();
+        let mut shapes = ShapeCounts::default();
+        let mut triangles = 0;
+        for shape in &description.shapes {
+            match &shape.geometry {
+                ShapeGeometry::Mesh(mesh) => {
+                    triangles += mesh.triangles.len();
+                    *(if mesh.normals.is_empty() { &mut shapes.flat_meshes } else { &mut shapes.smooth_meshes }) += 1;
+                }
+                ShapeGeometry::Sphere { .. } => shapes.spheres += 1,
+                ShapeGeometry::Disk { .. } => shapes.disks += 1,
+            }
+        }
+        let count = |is: fn(&Light) -> bool| description.lights.iter().filter(|l| is(l)).count();
+        Features {
+            materials,
+            smooth_lobes: lobes.iter().any(|l| l.smooth),
+            delta_lobes: lobes.iter().any(|l| l.delta_reflection || l.delta_transmission),
+            lobe_choice: lobes.iter().any(|l| l.need_choice()),
+            area_lights: description.shapes.iter().filter(|s| s.emission.is_some()).count(),
+            point_lights: count(|l| matches!(l, Light::Point { .. })),
+            infinite_lights: count(|l| matches!(l, Light::Constant { .. })),
+            shapes,
+            triangles,
+            integrator: description.integrator,
+        }
+    }
+
+    /// Number of lights of all kinds.
+    pub fn lights(&self) -> usize {
+        self.area_lights + self.point_lights + self.infinite_lights
+    }
+
+    /// Whether choosing among lights takes a primary dimension.
+    pub fn light_choice(&self) -> bool {
+        self.lights() > 1
+    }
+
+    /// The kernel to run: the smallest that does all the scene needs.
+    pub fn kernel(&self) -> Kernel {
+        let flat = self.shapes.smooth_meshes + self.shapes.spheres + self.shapes.disks == 0;
+        let diffuse = self.materials.keys().all(|&name| name == "diffuse");
+        if flat && diffuse && self.point_lights + self.infinite_lights == 0 { Kernel::Diffuse } else { Kernel::Full }
+    }
+}
+
+/// The closed list of kernels, smallest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// Diffuse materials on flat meshes, lit by meshes.
+    Diffuse,
+    /// Everything.
+    Full,
+}
+
+impl Kernel {
+    /// Its name in messages and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kernel::Diffuse => "diffuse",
+            Kernel::Full => "full",
+        }
+    }
+}
+
+/// What a kernel may take for granted, known at compile time.
+pub trait Profile {
+    /// All materials are diffuse.
+    const DIFFUSE: bool;
+    /// All shapes are triangle meshes without shading normals, so are all lights.
+    const FLAT_MESHES: bool;
+}
+
+/// The profile of [`Kernel::Diffuse`].
+pub enum DiffuseProfile {}
+
+/// The profile of [`Kernel::Full`].
+pub enum FullProfile {}
+
+impl Profile for DiffuseProfile {
+    const DIFFUSE: bool = true;
+    const FLAT_MESHES: bool = true;
+}
+
+impl Profile for FullProfile {
+    const DIFFUSE: bool = false;
+    const FLAT_MESHES: bool = false;
+}

@@ -1,0 +1,50 @@
+//! Lambertian reflection.
+
+use glam::Vec3;
+
+use super::{Evaluation, Lobes, Scatter, ScatterSample};
+use crate::{
+    math::warp,
+    scene::{Rgb, parameters::Parameters},
+};
+
+/// f(wo, wi) = ρ/π above the surface, nothing below. Parameter: `reflectance` ρ, 0…1, default 0.5.
+#[derive(Clone, Copy, Debug)]
+pub struct Diffuse {
+    /// Albedo ρ.
+    pub reflectance: Rgb,
+}
+
+impl Scatter for Diffuse {
+    fn lobes(&self) -> Lobes {
+        Lobes { smooth: true, delta_reflection: false, delta_transmission: false }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u: [f32; 2], _choice: f32) -> Option<ScatterSample> {
+        let wi = warp::cosine_hemisphere(u);
+        (wo.z > 0.0 && wi.z > 0.0).then(|| ScatterSample {
+            wi,
+            weight: self.reflectance,
+            pdf: warp::cosine_hemisphere_pdf(wi.z),
+            eta: 1.0,
+        })
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::ZERO;
+        }
+        let pdf = warp::cosine_hemisphere_pdf(wi.z);
+        Evaluation { value: self.reflectance * pdf, pdf }
+    }
+
+    fn read(p: &mut dyn Parameters) -> Self {
+        Diffuse { reflectance: p.reflectance("reflectance", 0.5) }
+    }
+
+    fn examples() -> Vec<Self> {
+        vec![Diffuse { reflectance: Rgb::new(0.9, 0.5, 0.0) }, Diffuse { reflectance: Rgb::ONE }]
+    }
+}
