@@ -37,11 +37,25 @@ struct Emitter {
 #[derive(Clone, Debug)]
 enum Form {
     /// Triangles chosen in proportion to area: upper ends of their shares, and 1/(total area).
-    Mesh { mesh: std::sync::Arc<Mesh>, cumulative: Vec<f32>, inverse_area: f32 },
-    Sphere { center: Vec3, radius: f32, flipped: bool },
-    Disk { center: Vec3, frame: Frame, radius: f32 },
+    Mesh {
+        mesh: std::sync::Arc<Mesh>,
+        cumulative: Vec<f32>,
+        inverse_area: f32,
+    },
+    Sphere {
+        center: Vec3,
+        radius: f32,
+        flipped: bool,
+    },
+    Disk {
+        center: Vec3,
+        frame: Frame,
+        radius: f32,
+    },
     Constant,
-    Point { position: Vec3 },
+    Point {
+        position: Vec3,
+    },
 }
 
 /// A direction towards a light.
@@ -231,9 +245,7 @@ impl Form {
                 Form::Mesh { mesh: mesh.clone(), cumulative, inverse_area: (1.0 / total) as f32 }
             }
             &ShapeGeometry::Sphere { center, radius, flipped } => Form::Sphere { center, radius, flipped },
-            &ShapeGeometry::Disk { center, normal, radius } => {
-                Form::Disk { center, frame: Frame::new(normal), radius }
-            }
+            &ShapeGeometry::Disk { center, normal, radius } => Form::Disk { center, frame: Frame::new(normal), radius },
         }
     }
 }

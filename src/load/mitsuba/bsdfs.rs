@@ -2,16 +2,13 @@
 
 use std::collections::HashMap;
 
-use glam::{Affine3A, Vec3};
-
 use super::document::{Element, Kind};
 use super::ids::Ids;
 use super::parameters::ElementParameters;
 use crate::load::faults::Faults;
 use crate::scene::Rgb;
 use crate::scene::description::Sides;
-use crate::scene::materials::{self, Material};
-use crate::scene::parameters::Parameters;
+use crate::scene::materials::{self, Diffuse, Material};
 
 /// Reads each element once and lists the materials that shapes use.
 pub struct Library<'a> {
@@ -83,7 +80,7 @@ impl<'a> Library<'a> {
             return *sides;
         }
         let reflectance = if which == Bare::Grey { 0.5 } else { 0.0 };
-        let material = materials::read("diffuse", &mut Reflectance(reflectance)).expect("diffuse is always known");
+        let material = Material::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) });
         let sides = Sides::One(self.list(material));
         self.defaults.insert(which, sides);
         sides
@@ -155,45 +152,10 @@ impl<'a> Library<'a> {
             return None;
         }
         let Some(Bsdf::One(material)) = self.bsdf(element) else { return None };
-        if transmits(&material) {
+        if material.lobes().transmit() {
             let message = format!("bsdf \"twosided\" cannot hold {}, which transmits light", element.described());
             self.faults.at(&side.span, message);
         }
         Some(material)
-    }
-}
-
-/// Whether light passes through a surface of this material. To be answered by the materials themselves.
-fn transmits(_material: &Material) -> bool {
-    false
-}
-
-/// Parameters of a default `diffuse`.
-struct Reflectance(f32);
-
-impl Parameters for Reflectance {
-    fn float(&mut self, _name: &str) -> Option<f32> {
-        None
-    }
-    fn integer(&mut self, _name: &str) -> Option<i64> {
-        None
-    }
-    fn boolean(&mut self, _name: &str) -> Option<bool> {
-        None
-    }
-    fn string(&mut self, _name: &str) -> Option<String> {
-        None
-    }
-    fn rgb(&mut self, name: &str) -> Option<Rgb> {
-        (name == "reflectance").then(|| Rgb::splat(self.0))
-    }
-    fn point(&mut self, _name: &str) -> Option<Vec3> {
-        None
-    }
-    fn to_world(&mut self) -> Affine3A {
-        Affine3A::IDENTITY
-    }
-    fn fault(&mut self, name: &str, message: String) {
-        unreachable!("the default reflectance is no fault: {name}: {message}");
     }
 }

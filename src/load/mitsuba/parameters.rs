@@ -8,7 +8,7 @@ use super::document::{Element, Kind};
 use super::{transforms, values};
 use crate::load::faults::{Faults, did_you_mean, list};
 use crate::scene::Rgb;
-use crate::scene::parameters::Parameters;
+use crate::scene::parameters::{NumberOrName, Parameters};
 
 /// Reads an element; [`finish`](Self::finish) then reports all in it that nothing asked for.
 pub struct ElementParameters<'a> {
@@ -146,6 +146,13 @@ impl Parameters for ElementParameters<'_> {
 
     fn rgb(&mut self, name: &str) -> Option<Rgb> {
         self.parsed(name, &["rgb", "spectrum", "float", "integer"], values::rgb)
+    }
+
+    fn number_or_name(&mut self, name: &str) -> Option<NumberOrName> {
+        if self.value(name, &["float", "integer", "string"])?.tag == "string" {
+            return self.string(name).map(NumberOrName::Name);
+        }
+        self.float(name).map(NumberOrName::Number)
     }
 
     fn point(&mut self, name: &str) -> Option<Vec3> {
