@@ -2,7 +2,7 @@
 //!
 //! Source: Kelemen et al. 2002; the paper's comparison renders with it in two passes.
 
-use super::{Evaluator, Recorder, Target, Walkers};
+use super::{Evaluator, Recorder, Start, Target, Walkers, replay};
 use crate::{
     path::Contribution,
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -24,33 +24,14 @@ pub struct Baseline<W> {
     pub large: (f64, u64),
 }
 
-/// Where a chain starts: the counter of the bootstrap sample to replay and the luminance that it must give again.
-#[derive(Clone, Copy, Debug)]
-pub struct Start {
-    /// Counter of the sample.
-    pub counter: Counter,
-    /// Its ln g.
-    pub ln_g: f64,
-}
-
 impl<W: Default> Baseline<W> {
     /// Chains `first_chain`, `first_chain + 1`, … put into those states by replaying them.
-    ///
-    /// # Panics
-    /// If a replayed sample does not give the same luminance: the target is not a function of its point.
     pub fn new<T: Target<Workspace = W>>(target: &T, rng: Rng, first_chain: u32, starts: &[Start]) -> Baseline<W> {
+        let counter =
+            |lane: usize| Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
         let mut walkers = Walkers::new(starts.len());
-        let counters = starts.iter().map(|s| s.counter).collect();
-        let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, counters);
-        evaluator.moves.fill(Move::Fresh);
-        evaluator.evaluate(target, &walkers.points);
-        for (lane, start) in starts.iter().enumerate() {
-            let state = evaluator.out.lanes[lane];
-            assert_eq!(state.ln_g, start.ln_g, "replaying {:?} gave another luminance", start.counter);
-            walkers.replace(lane, (&evaluator.points, lane), &state, &mut |_, _| {});
-            evaluator.counters[lane] =
-                Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
-        }
+        let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, (0..starts.len()).map(counter).collect());
+        replay(target, starts, &mut walkers, &mut evaluator);
         Baseline { walkers, evaluator, steps: 0, small: (0.0, 0), large: (0.0, 0) }
     }
 

@@ -3,11 +3,13 @@
 mod baseline;
 mod metropolis;
 mod recorder;
+mod start;
 mod target;
 mod walkers;
 
-pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, Start};
+pub use baseline::{Baseline, LARGE_STEP_PROBABILITY};
 pub use metropolis::acceptance;
 pub use recorder::Recorder;
+pub use start::{Start, replay, resample};
 pub use target::{Evaluator, Target};
 pub use walkers::Walkers;

@@ -1,23 +1,22 @@
 //! `relt render`: from a scene file to an image.
 
 use std::path::{Path, PathBuf, absolute};
-use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::PoisonError;
-use std::sync::atomic::AtomicBool;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
 use clap::Args;
 
 use super::failure::Failure;
-use super::scene::{Opened, SceneArguments};
+use super::scene::SceneArguments;
 use super::{signals, values};
 use crate::render::log::{self, Log};
 use crate::render::progress::Progress;
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    Combine, LadderChoice, Method, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary,
+    self, Combine, Job, LadderChoice, Method, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status,
+    Summary,
 };
 
 /// Renders a scene to an OpenEXR image with a PNG preview
@@ -100,7 +99,9 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     }
     let audience = Audience { snapshots: arguments.snapshot.map(Snapshots::every), output: &output, log, progress };
 
-    let outcome = render(&arguments.scene.path, &opened, &settings, &audience, &stop)?;
+    let scene_name = arguments.scene.path.display().to_string();
+    let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
+    let outcome = render::run(&job, &audience).map_err(Failure::running)?;
 
     output.write(&outcome.picture).map_err(Failure::running)?;
     audience.finished(&Summary {
@@ -110,25 +111,6 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
         warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
     });
     Ok(())
-}
-
-/// What a run leaves behind.
-struct Outcome {
-    picture: Picture,
-    status: Status,
-    interrupted: bool,
-    warnings: Vec<String>,
-}
-
-/// CONNECT: `crate::render::run(Job { scene, settings, stop, … }, audience)`, its errors by `Failure::running`.
-fn render(
-    _path: &Path,
-    _opened: &Opened,
-    _settings: &Settings,
-    _audience: &dyn Observer,
-    _stop: &Arc<AtomicBool>,
-) -> Result<Outcome, Failure> {
-    Err(Failure::running("this build does not render yet"))
 }
 
 impl Render {

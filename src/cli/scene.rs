@@ -1,13 +1,14 @@
 //! Scene files, as every subcommand takes them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::failure::Failure;
 use super::values;
 use crate::embree::Device;
-use crate::scene::{Scene, SceneDescription};
+use crate::load;
+use crate::scene::Scene;
 
 /// A scene file and values for its parameters.
 #[derive(Args)]
@@ -41,15 +42,10 @@ impl SceneArguments {
 
     /// Reads the file and builds the scene.
     pub fn open(&self) -> Result<Opened, Failure> {
-        let description = describe(&self.path, &self.defines)?;
+        let description = load::scene(&self.path, &self.defines).map_err(Failure::shown)?;
         let device = Device::new("").map_err(Failure::input)?;
         let warnings = description.warnings.clone();
         let scene = Scene::new(&device, description).map_err(Failure::running)?;
         Ok(Opened { device, scene, warnings })
     }
-}
-
-/// CONNECT: `crate::load::scene(path, defines).map_err(Failure::shown)`.
-fn describe(path: &Path, _defines: &[(String, String)]) -> Result<SceneDescription, Failure> {
-    Err(Failure::input(format_args!("{}: this build does not read scene files yet", path.display())))
 }

@@ -8,10 +8,10 @@ use super::{
     plan::Plan,
 };
 use crate::{
-    chain::{Baseline, Evaluator, Start},
+    chain::{Baseline, Evaluator, Start, resample},
     film::{Accumulator, Plane, Splats},
     path::unidirectional::Workspace,
-    rng::{Counter, Purpose, open_unit_f64},
+    rng::{Counter, Purpose},
     sample::{Move, Points, StepLaw},
     tempering::{Estimate, uniform_mean},
 };
@@ -46,9 +46,9 @@ impl TwoPassMlt {
         let groups: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
         let normalisation = uniform_mean(&groups);
-        let ln_g: Vec<f64> = batches.iter().flat_map(|b| b.ln_g.iter().copied()).collect();
+        let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
         // a black scene has no state to start from: no chains, a black image
-        let starts = resample(stage, &ln_g, plan.blocks * plan.lanes());
+        let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
         let blocks = starts
             .par_chunks(plan.lanes())
             .enumerate()
@@ -85,6 +85,10 @@ fn bootstrap_counter(sample: u64) -> Counter {
     Counter { ladder: 0, replica: 0, step: sample, purpose: Purpose::Bootstrap }
 }
 
+fn bootstrap_sample((sample, ln_g): (usize, &f64)) -> Start {
+    Start { counter: bootstrap_counter(sample as u64), ln_g: *ln_g }
+}
+
 fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
     (0..samples.div_ceil(BOOTSTRAP_BATCH))
         .into_par_iter()
@@ -98,30 +102,6 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
             Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.non_finite }
         })
         .collect()
-}
-
-/// States for `chains` chains in proportion to g, by systematic resampling; none where all is dark.
-fn resample(stage: &Stage, ln_g: &[f64], chains: usize) -> Vec<Start> {
-    let largest = ln_g.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if largest == f64::NEG_INFINITY {
-        return Vec::new();
-    }
-    let weights: Vec<f64> = ln_g.iter().map(|l| libm::exp(l - largest)).collect();
-    let total: f64 = weights.iter().sum();
-    let counter = Counter { ladder: 0, replica: 0, step: 0, purpose: Purpose::Start };
-    let offset = open_unit_f64(stage.rng.words(counter, 0)[0]);
-    let mut starts = Vec::with_capacity(chains);
-    let mut cumulative = 0.0;
-    for (sample, weight) in weights.iter().enumerate() {
-        cumulative += weight;
-        while starts.len() < chains && (starts.len() as f64 + offset) / chains as f64 * total < cumulative {
-            starts.push(Start { counter: bootstrap_counter(sample as u64), ln_g: ln_g[sample] });
-        }
-    }
-    // rounding may leave the last thresholds above the last sum
-    let last = weights.iter().rposition(|w| *w > 0.0).expect("some sample is lit");
-    starts.resize(chains, Start { counter: bootstrap_counter(last as u64), ln_g: ln_g[last] });
-    starts
 }
 
 impl Engine for TwoPassMlt {

@@ -1,8 +1,10 @@
 //! `re`: replica exchange. One progressive pass gives image and normalisation.
 //!
-//! Sweeps come in rounds of doubling length. During a round the weights of the combination are fixed, made from the
-//! normalisers known before it. The first sweeps are a warm-up, in which chains leave the places where they started;
-//! only the uniform replica's own estimate and the normalisers keep anything of it.
+//! The first sweeps are uniform points only. Like every uniform point they enter the uniform replica's own estimate and
+//! the normalisers; the chains of all rungs start from states resampled among them. (Chains that started from nothing
+//! and waited for swaps left the image 10 % dark after 500 sweeps, where a bright light fills little of the picture.)
+//! Then sweeps come in rounds of doubling length. During a round the weights of the combination are fixed, made from
+//! the normalisers known before it.
 
 use std::sync::Arc;
 
@@ -14,18 +16,19 @@ use super::{
     settings::{Combine, LadderChoice, Settings},
 };
 use crate::{
+    chain::{Start, resample},
     film::{Accumulator, Plane, Splats},
     path::unidirectional::Workspace,
     tempering::{
-        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, Phase, RungCounts, Statistics, Weights,
-        layer, uniform_mean,
+        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, RungCounts, Statistics, Weights, layer,
+        uniform_mean,
     },
 };
 
 /// Uniform points that each ladder draws a sweep.
 const UNIFORM_DRAWS: usize = 1;
-/// Sweeps of warm-up; a sixteenth of the run where that is shorter.
-const WARM_UP: u64 = 64;
+/// Independent samples from which chains start; a sixteenth of the run where that is less.
+const BOOTSTRAP: u64 = 1 << 17;
 /// Standard errors by which the uniform mean and MBAR may differ before the person is told.
 const ALARMING_DIFFERENCE: f64 = 3.0;
 
@@ -45,13 +48,14 @@ pub struct ReplicaExchange {
     film: Accumulator,
     blocks: Vec<Lane>,
     sweeps: u64,
-    warm_up: u64,
-    /// The sweep before which the next round begins: the end of the warm-up, then twice as late each time.
+    /// How many of the sweeps are uniform points only.
+    bootstrap: u64,
+    /// The sweep before which the next round begins: the end of the bootstrap, then twice as late each time.
     next_round: u64,
-    /// The weights of the round at work; `None` during the warm-up.
-    weights: Option<Weights>,
-    /// Magnitude of c in which tempered states are kept on the film, once known.
-    unit: Option<f64>,
+    /// The weights of the round at work.
+    weights: Weights,
+    /// Magnitude of c in which tempered states are kept on the film.
+    unit: f64,
 }
 
 /// A block with its splats.
@@ -60,9 +64,8 @@ struct Lane {
     splats: Splats,
 }
 
-/// All blocks' statistics and what follows from them.
+/// What follows from all blocks' statistics.
 struct Pooled {
-    statistics: Vec<Statistics>,
     normalisers: Normalisers,
     uniform: Estimate,
 }
@@ -76,60 +79,75 @@ impl ReplicaExchange {
             block: Block::new(ladder.clone(), stage.rng, (i * plan.groups) as u32, plan.groups, UNIFORM_DRAWS),
             splats: Splats::new(LAYERS),
         };
-        let warm_up = plan.sweeps.map_or(WARM_UP, |sweeps| WARM_UP.min(sweeps / 16));
+        let bootstrap = BOOTSTRAP.div_ceil(plan.a_sweep());
+        let bootstrap = plan.sweeps.map_or(bootstrap, |sweeps| bootstrap.min(sweeps / 16).max(1));
+        let combination = match settings.combine {
+            Combine::Target => Combination::Target,
+            Combine::Balance => Combination::Balance,
+        };
+        let nothing_known = vec![f64::NEG_INFINITY; ladder.rungs()];
+        let counts = vec![1.0; ladder.rungs()];
         ReplicaExchange {
             film: stage.accumulator(LAYERS),
             blocks: (0..plan.blocks).map(block).collect(),
-            combination: match settings.combine {
-                Combine::Target => Combination::Target,
-                Combine::Balance => Combination::Balance,
-            },
+            combination,
             sweeps: 0,
-            warm_up,
-            next_round: warm_up,
-            weights: None,
-            unit: None,
+            bootstrap,
+            next_round: bootstrap,
+            weights: Weights::new(combination, &ladder, &nothing_known, &counts, 1.0),
+            unit: 1.0,
             plan,
             ladder,
         }
     }
 
-    fn phase(&self) -> Phase<'_> {
-        self.weights.as_ref().map_or(Phase::WarmUp, Phase::Round)
-    }
-
-    /// Ends the round at work and fixes the weights of the next.
+    /// Ends the round at work and fixes the weights of the next; the first time, chains start.
     fn begin_round(&mut self, stage: &Stage) {
-        let phase = self.weights.as_ref().map_or(Phase::WarmUp, Phase::Round);
-        let film = &self.film;
+        let (film, weights) = (&self.film, &self.weights);
         self.blocks.par_iter_mut().for_each(|lane| {
-            lane.block.flush(phase, &mut stage.recorder(&mut lane.splats));
+            lane.block.flush(weights, &mut stage.recorder(&mut lane.splats));
             film.deposit(&mut lane.splats);
         });
-        if self.weights.is_none() {
-            self.blocks.iter_mut().for_each(|lane| lane.block.reset_counts());
+        let recorded: Vec<&Statistics> = self.blocks.iter().map(|lane| lane.block.recorded()).collect();
+        let ln_zeta = Pooled::solve(&self.ladder, &recorded).normalisers.ln_z;
+        if self.sweeps == self.bootstrap {
+            let c = ln_zeta[ln_zeta.len() - 1].exp();
+            let brightest = f64::from(stage.mapping.scene().emitters.brightest());
+            self.unit = if c > 0.0 && c.is_finite() { c } else { brightest };
+            self.start_chains(stage);
         }
-        let ln_zeta = self.pool(stage, &mut Splats::new(LAYERS)).normalisers.ln_z;
-        let c = ln_zeta[ln_zeta.len() - 1].exp();
-        let brightest = f64::from(stage.mapping.scene().emitters.brightest());
-        let unit = *self.unit.get_or_insert(if c > 0.0 && c.is_finite() { c } else { brightest });
         let mut counts = vec![1.0; self.ladder.rungs()];
         counts[0] = UNIFORM_DRAWS as f64;
-        self.weights = Some(Weights::new(self.combination, &self.ladder, &ln_zeta, &counts, unit));
+        self.weights = Weights::new(self.combination, &self.ladder, &ln_zeta, &counts, self.unit);
     }
 
-    /// Statistics of all blocks; splats of states not yet recorded go to `splats`.
-    fn pool(&self, stage: &Stage, splats: &mut Splats) -> Pooled {
-        let mut recorder = stage.recorder(splats);
-        let statistics: Vec<Statistics> =
-            self.blocks.iter().map(|lane| lane.block.snapshot(self.phase(), &mut recorder)).collect();
+    /// Resamples the bootstrap for every rung and puts the chains there.
+    fn start_chains(&mut self, stage: &Stage) {
+        let samples: Vec<Start> = self.blocks.iter_mut().flat_map(|lane| lane.block.take_bootstrap()).collect();
+        let ladders = self.plan.blocks * self.plan.groups;
+        let starts: Vec<Vec<Start>> = self.ladder.betas()[1..]
+            .par_iter()
+            .enumerate()
+            .map(|(rung, &beta)| resample(&samples, beta, ladders, stage.rng, rung as u32))
+            .collect();
+        let groups = self.plan.groups;
+        self.blocks.par_iter_mut().enumerate().for_each(|(i, lane)| {
+            let of_block = i * groups..(i + 1) * groups;
+            let starts: Vec<&[Start]> =
+                starts.iter().map(|rung| rung.get(of_block.clone()).unwrap_or_default()).collect();
+            lane.block.start(&stage.mapping, &starts);
+        });
+    }
+}
+
+impl Pooled {
+    fn solve(ladder: &Ladder, statistics: &[&Statistics]) -> Pooled {
         let groups: Vec<Group> = statistics
             .iter()
             .map(|s| Group { uniform: &s.uniform, tempered: &s.tempered, weights: &s.weights })
             .collect();
-        let normalisers = Normalisers::solve(&self.ladder, &groups);
-        let sums: Vec<(f64, f64)> = statistics.iter().map(|s| s.uniform_sum).collect();
-        Pooled { normalisers, uniform: uniform_mean(&sums), statistics }
+        let sums: Vec<(f64, f64)> = statistics.iter().map(|s| (s.uniform_sum, s.uniform_points as f64)).collect();
+        Pooled { normalisers: Normalisers::solve(ladder, &groups), uniform: uniform_mean(&sums) }
     }
 }
 
@@ -147,14 +165,18 @@ impl Engine for ReplicaExchange {
         while self.sweeps < end {
             if self.sweeps == self.next_round {
                 self.begin_round(stage);
-                self.next_round = (2 * self.sweeps).max(1);
+                self.next_round = 2 * self.sweeps;
             }
             let sweeps = self.next_round.min(end) - self.sweeps;
-            let phase = self.weights.as_ref().map_or(Phase::WarmUp, Phase::Round);
-            let film = &self.film;
+            let chains_move = self.sweeps >= self.bootstrap;
+            let (film, weights) = (&self.film, &self.weights);
             self.blocks.par_iter_mut().for_each(|lane| {
                 let mut recorder = stage.recorder(&mut lane.splats);
-                lane.block.advance(&stage.mapping, sweeps, phase, &mut recorder);
+                if chains_move {
+                    lane.block.advance(&stage.mapping, sweeps, weights, &mut recorder);
+                } else {
+                    lane.block.bootstrap(&stage.mapping, sweeps, &mut recorder);
+                }
                 film.deposit(&mut lane.splats);
             });
             self.sweeps += sweeps;
@@ -180,31 +202,29 @@ impl Engine for ReplicaExchange {
     /// states are scaled up for the sweeps in which chains had no state yet.
     fn develop(&self, stage: &Stage) -> Development {
         let mut splats = Splats::new(LAYERS);
-        let pooled = self.pool(stage, &mut splats);
+        let mut recorder = stage.recorder(&mut splats);
+        let statistics: Vec<Statistics> =
+            self.blocks.iter().map(|lane| lane.block.with_pending(&self.weights, &mut recorder)).collect();
+        let pooled = Pooled::solve(&self.ladder, &statistics.iter().collect::<Vec<_>>());
         let pending = stage.accumulator(LAYERS);
         pending.deposit(&mut splats);
         let layer = |number: usize| layer_with(stage, &self.film, &pending, number);
 
         let ladders = (self.plan.blocks * self.plan.groups) as f64;
         let pixels = stage.pixels() as f64;
-        let rounds = self.sweeps.saturating_sub(self.warm_up) as f64 * ladders;
-        let uniform_draws = self.sweeps as f64 * ladders * UNIFORM_DRAWS as f64;
         let inverse = |n: f64| if n > 0.0 { pixels / n } else { 0.0 };
-
+        let uniform_scale = inverse(statistics.iter().map(|s| s.uniform_points).sum::<u64>() as f64);
+        let hot_scale = inverse(self.sweeps.saturating_sub(self.bootstrap) as f64 * ladders * UNIFORM_DRAWS as f64);
+        // one sample a sweep and rung was planned; `deposited` of them had a state and a share
+        let deposited: f64 = statistics.iter().map(|s| s.deposited).sum();
         let used_rungs = match self.combination {
             Combination::Target => 1.0,
             Combination::Balance => (self.ladder.rungs() - 1) as f64,
         };
-        let deposited: f64 = pooled.statistics.iter().flat_map(|s| &s.deposited).sum();
-        let c = pooled.normalisers.target.value;
-        // one sample a sweep and rung was planned; `deposited` of them had a state and a share
-        let tempered_scale =
-            if deposited > 0.0 { pixels * used_rungs / deposited * c / self.unit.unwrap_or(1.0) } else { 0.0 };
-        let hot_scale = inverse(rounds * UNIFORM_DRAWS as f64);
+        let tempered_scale = inverse(deposited) * used_rungs * pooled.normalisers.target.value / self.unit;
 
         let (uniform, hot, tempered) = (layer(layer::UNIFORM), layer(layer::HOT), layer(layer::TEMPERED));
         let image = stage.image(|i| [0, 1, 2].map(|ch| hot[i][ch] * hot_scale + tempered[i][ch] * tempered_scale));
-        let uniform_scale = inverse(uniform_draws);
         let uniform = stage.image(|i| [0, 1, 2].map(|ch| uniform[i][ch] * uniform_scale));
         let density = hot.iter().zip(&tempered).map(|(h, t)| (h[3] + t[3]) as f32).collect();
         Development {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Histogram, Ladder, Weights, ladder::swap_acceptance};
 use crate::{
-    chain::{Evaluator, Recorder, Target, Walkers},
+    chain::{Evaluator, Recorder, Start, Target, Walkers, replay},
     path::Contribution,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
@@ -62,25 +62,15 @@ pub struct Block<W> {
     replica_on: Vec<u16>,
     /// The replicas' lanes, then `uniform_draws` lanes for each ladder.
     evaluator: Evaluator<W>,
+    /// Sweeps in which chains moved, and those before.
     sweeps: u64,
+    bootstrap_sweeps: u64,
+    /// Independent samples of the bootstrap, until chains start.
+    bootstrap: Vec<Start>,
     /// By rung; entry 0 is unused.
     counts: Vec<RungCounts>,
-    uniform: Histogram,
-    uniform_sum: f64,
-    tempered: Histogram,
-    /// Weight of recorded states by rung.
-    weights: Vec<f64>,
-    /// Weight of the states that went to the film, by rung.
-    deposited: Vec<f64>,
-}
-
-/// What a block does with the states it goes through.
-#[derive(Clone, Copy)]
-pub enum Phase<'a> {
-    /// Chains are finding their feet: only the uniform replica's own estimate is kept.
-    WarmUp,
-    /// States go to the image with these weights and into the statistics.
-    Round(&'a Weights),
+    /// What has been recorded.
+    seen: Statistics,
 }
 
 impl<W: Default> Block<W> {
@@ -102,17 +92,56 @@ impl<W: Default> Block<W> {
             rung: (0..ladders * chains).map(|lane| (lane % chains) as u16 + 1).collect(),
             replica_on: (0..ladders * chains).map(|lane| (lane % chains) as u16).collect(),
             counts: vec![RungCounts::default(); ladder.rungs()],
-            weights: vec![0.0; ladder.rungs()],
-            deposited: vec![0.0; ladder.rungs()],
-            uniform: Histogram::default(),
-            uniform_sum: 0.0,
-            tempered: Histogram::default(),
+            seen: Statistics::new(ladder.rungs()),
+            bootstrap: Vec::new(),
             ladder,
             ladders,
             uniform_draws,
             evaluator,
             sweeps: 0,
+            bootstrap_sweeps: 0,
         }
+    }
+
+    /// Evaluates every lane at a fresh uniform point in each of `sweeps` sweeps: independent samples for the
+    /// uniform replica's own estimate, for the normalisers, and for chains to [`start`](Self::start) from.
+    pub fn bootstrap<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, recorder: &mut Recorder) {
+        self.evaluator.moves.fill(Move::Fresh);
+        for _ in 0..sweeps {
+            for counter in &mut self.evaluator.counters {
+                (counter.step, counter.purpose) = (self.bootstrap_sweeps, Purpose::Bootstrap);
+            }
+            self.evaluator.evaluate(target, &self.walkers.points);
+            for (counter, point) in self.evaluator.counters.iter().zip(&self.evaluator.out.lanes) {
+                self.bootstrap.push(Start { counter: *counter, ln_g: point.ln_g });
+                self.seen.uniform_point(point, recorder);
+            }
+            self.bootstrap_sweeps += 1;
+        }
+        self.evaluator.counters.iter_mut().for_each(|counter| counter.purpose = Purpose::Primary);
+    }
+
+    /// The samples of the bootstrap, which are forgotten here.
+    pub fn take_bootstrap(&mut self) -> Vec<Start> {
+        std::mem::take(&mut self.bootstrap)
+    }
+
+    /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block. Without any,
+    /// chains stay null until they meet light.
+    pub fn start<T: Target<Workspace = W>>(&mut self, target: &T, starts: &[&[Start]]) {
+        let chains = self.ladder.rungs() - 1;
+        if starts.iter().all(|rung| rung.is_empty()) {
+            return;
+        }
+        // neighbouring rungs were resampled in the same order: rotated, so that a ladder does not start everywhere
+        // from the same sample
+        let of_lane = |lane: usize| {
+            let (ladder, replica) = (lane / chains, lane % chains);
+            starts[replica][(ladder + replica * self.ladders.div_ceil(chains)) % self.ladders]
+        };
+        let starts: Vec<Start> = (0..self.rung.len()).map(of_lane).collect();
+        replay(target, &starts, &mut self.walkers, &mut self.evaluator);
+        self.evaluator.moves.fill(Move::Fresh);
     }
 
     /// Goes through `sweeps` sweeps.
@@ -120,14 +149,14 @@ impl<W: Default> Block<W> {
         &mut self,
         target: &T,
         sweeps: u64,
-        phase: Phase,
+        weights: &Weights,
         recorder: &mut Recorder,
     ) {
         for _ in 0..sweeps {
             self.propose(target);
-            self.explore(phase, recorder);
-            self.inject(phase, recorder);
-            self.swap(phase, recorder);
+            self.explore(weights, recorder);
+            self.inject(weights, recorder);
+            self.swap(weights, recorder);
             self.sweeps += 1;
         }
     }
@@ -144,14 +173,14 @@ impl<W: Default> Block<W> {
     }
 
     /// One Metropolis step of every replica at its own inverse temperature.
-    fn explore(&mut self, phase: Phase, recorder: &mut Recorder) {
+    fn explore(&mut self, weights: &Weights, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
         for lane in 0..self.rung.len() {
             let k = usize::from(self.rung[lane]);
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
             let u = open_unit_f64(rng.words(counter, 0)[0]);
             let proposed = self.evaluator.out.lanes[lane];
-            let mut record = record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+            let mut record = record(weights, k, &mut self.seen, recorder);
             let small = self.evaluator.moves[lane] == Move::Small;
             let beta = self.ladder.betas()[k];
             let alpha = self.walkers.step(lane, beta, (&self.evaluator.points, lane), &proposed, u, &mut record);
@@ -163,25 +192,21 @@ impl<W: Default> Block<W> {
     }
 
     /// Records the uniform points and offers each to the lowest chain of its ladder, a swap that costs nothing.
-    fn inject(&mut self, phase: Phase, recorder: &mut Recorder) {
+    fn inject(&mut self, weights: &Weights, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
         let chains = self.ladder.rungs() - 1;
         let coldest_of_pair = self.ladder.betas()[1];
         for i in 0..self.ladders * self.uniform_draws {
             let from = self.rung.len() + i;
             let point = self.evaluator.out.lanes[from];
-            self.uniform.add(point.ln_g, 1.0);
+            self.seen.uniform_point(&point, recorder);
             if point.is_dark() {
                 self.counts[1].offered += 1;
                 continue;
             }
-            self.uniform_sum += point.g();
-            recorder.splat(layer::UNIFORM, &point, 1.0, 1.0);
-            if let Phase::Round(weights) = phase {
-                let share = weights.uniform(point.ln_g);
-                if share > 0.0 {
-                    recorder.splat(layer::HOT, &point, share, 1.0);
-                }
+            let share = weights.uniform(point.ln_g);
+            if share > 0.0 {
+                recorder.splat(layer::HOT, &point, share, 1.0);
             }
             let ladder = i / self.uniform_draws;
             let lane = ladder * chains + usize::from(self.replica_on[ladder * chains]);
@@ -190,14 +215,14 @@ impl<W: Default> Block<W> {
             self.counts[1].offered += 1;
             let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[from] };
             if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
-                let mut record = record(phase, 1, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+                let mut record = record(weights, 1, &mut self.seen, recorder);
                 self.walkers.replace(lane, (&self.evaluator.points, from), &point, &mut record);
             }
         }
     }
 
     /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones.
-    fn swap(&mut self, phase: Phase, recorder: &mut Recorder) {
+    fn swap(&mut self, weights: &Weights, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
         let rungs = self.ladder.rungs();
         let chains = rungs - 1;
@@ -214,8 +239,7 @@ impl<W: Default> Block<W> {
                 let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[base] };
                 if open_unit_f64(rng.words(counter, colder as u16)[0]) < alpha {
                     for (lane, k) in lanes.into_iter().zip([hotter, colder]) {
-                        let mut record =
-                            record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+                        let mut record = record(weights, k, &mut self.seen, recorder);
                         self.walkers.flush(lane, &mut record);
                     }
                     self.rung.swap(lanes[0], lanes[1]);
@@ -225,33 +249,29 @@ impl<W: Default> Block<W> {
         }
     }
 
-    /// Records what all current states have gathered; must happen before a phase ends.
-    pub fn flush(&mut self, phase: Phase, recorder: &mut Recorder) {
+    /// Records what all current states have gathered; must happen before the weights change.
+    pub fn flush(&mut self, weights: &Weights, recorder: &mut Recorder) {
         for lane in 0..self.rung.len() {
             let k = usize::from(self.rung[lane]);
-            let mut record = record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+            let mut record = record(weights, k, &mut self.seen, recorder);
             self.walkers.flush(lane, &mut record);
         }
     }
 
+    /// The block's statistics as they are recorded.
+    pub fn recorded(&self) -> &Statistics {
+        &self.seen
+    }
+
     /// The block's statistics with those of states not yet recorded; the pending splats go to `recorder`.
-    pub fn snapshot(&self, phase: Phase, recorder: &mut Recorder) -> Statistics {
-        let mut tempered = self.tempered.clone();
-        let (mut weights, mut deposited) = (self.weights.clone(), self.deposited.clone());
-        for (lane, state) in
-            self.walkers.states.iter().enumerate().filter(|(lane, _)| self.walkers.pending[*lane] > 0.0)
-        {
-            let k = usize::from(self.rung[lane]);
-            let mut record = record(phase, k, &mut tempered, &mut weights, &mut deposited, recorder);
-            record(state, self.walkers.pending[lane]);
+    pub fn with_pending(&self, weights: &Weights, recorder: &mut Recorder) -> Statistics {
+        let mut seen = self.seen.clone();
+        for (lane, (state, &pending)) in self.walkers.states.iter().zip(&self.walkers.pending).enumerate() {
+            if pending > 0.0 {
+                record(weights, usize::from(self.rung[lane]), &mut seen, recorder)(state, pending);
+            }
         }
-        Statistics {
-            uniform: self.uniform.clone(),
-            uniform_sum: (self.uniform_sum, (self.sweeps * (self.ladders * self.uniform_draws) as u64) as f64),
-            tempered,
-            weights,
-            deposited,
-        }
+        seen
     }
 
     /// Acceptances and swaps by rung; entry 0 is empty.
@@ -259,14 +279,9 @@ impl<W: Default> Block<W> {
         &self.counts
     }
 
-    /// Forgets acceptances and swaps, as after the warm-up.
-    pub fn reset_counts(&mut self) {
-        self.counts.fill(RungCounts::default());
-    }
-
     /// Evaluations so far: steps of replicas and uniform points.
     pub fn mutations(&self) -> u64 {
-        self.sweeps * self.evaluator.moves.len() as u64
+        (self.bootstrap_sweeps + self.sweeps) * self.evaluator.moves.len() as u64
     }
 
     /// Rays traced and contributions settled so far.
@@ -280,33 +295,56 @@ impl<W: Default> Block<W> {
 pub struct Statistics {
     /// ln g of uniform points.
     pub uniform: Histogram,
-    /// Σ g over uniform points, and their number.
-    pub uniform_sum: (f64, f64),
+    /// Σ g over uniform points.
+    pub uniform_sum: f64,
+    /// Number of uniform points.
+    pub uniform_points: u64,
     /// ln g of states on tempered rungs, weighted.
     pub tempered: Histogram,
-    /// Weight of states by rung.
+    /// Weight of states by rung; entry 0 stays 0.
     pub weights: Vec<f64>,
-    /// Weight of states that went to the film, by rung.
-    pub deposited: Vec<f64>,
+    /// Weight of states that went to the film, all rungs.
+    pub deposited: f64,
 }
 
-/// A recorder of states on rung `k`: into the statistics and, with the phase's weights, onto the film.
+impl Statistics {
+    fn new(rungs: usize) -> Statistics {
+        Statistics {
+            uniform: Histogram::default(),
+            uniform_sum: 0.0,
+            uniform_points: 0,
+            tempered: Histogram::default(),
+            weights: vec![0.0; rungs],
+            deposited: 0.0,
+        }
+    }
+
+    /// Records an independent sample, and draws it where it is lit.
+    #[inline(always)]
+    fn uniform_point(&mut self, point: &Contribution, recorder: &mut Recorder) {
+        self.uniform.add(point.ln_g, 1.0);
+        self.uniform_points += 1;
+        if !point.is_dark() {
+            self.uniform_sum += point.g();
+            recorder.splat(layer::UNIFORM, point, 1.0, 1.0);
+        }
+    }
+}
+
+/// A recorder of states on rung `k`: into the statistics and, by the weights, onto the film.
 #[inline(always)]
 fn record<'r>(
-    phase: Phase<'r>,
+    weights: &'r Weights,
     k: usize,
-    tempered: &'r mut Histogram,
-    weights: &'r mut [f64],
-    deposited: &'r mut [f64],
+    seen: &'r mut Statistics,
     recorder: &'r mut Recorder<'_>,
 ) -> impl FnMut(&Contribution, f64) {
     move |state, weight| {
-        let Phase::Round(combination) = phase else { return };
-        tempered.add(state.ln_g, weight);
-        weights[k] += weight;
-        let value = combination.tempered(k, state.ln_g);
+        seen.tempered.add(state.ln_g, weight);
+        seen.weights[k] += weight;
+        let value = weights.tempered(k, state.ln_g);
         if value > 0.0 {
-            deposited[k] += weight;
+            seen.deposited += weight;
             recorder.splat(layer::TEMPERED, state, value * weight, weight);
         }
     }

@@ -12,7 +12,7 @@ mod histogram;
 mod ladder;
 mod normalisers;
 
-pub use block::{Block, LAYERS, Phase, RungCounts, Statistics, layer};
+pub use block::{Block, LAYERS, RungCounts, Statistics, layer};
 pub use combination::{Combination, Weights};
 pub use histogram::Histogram;
 pub use ladder::{Ladder, swap_acceptance};

@@ -1,0 +1,191 @@
+//! Ladders and chains on analytic targets, no scene needed: what is known exactly must come out.
+
+use std::sync::Arc;
+
+use relt::{
+    chain::{Recorder, Target},
+    film::{Accumulator, Filter, Footprint, Splats},
+    path::{Contribution, Contributions},
+    rng::{Rng, unit_f32},
+    sample::Proposals,
+    scene::Rgb,
+    tempering::{
+        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, Phase, Statistics, Weights, layer,
+        uniform_mean,
+    },
+};
+
+/// g on the unit square, drawn as an image of one row: the film position is the first coordinate.
+struct Analytic<F>(F);
+
+impl<F: Fn(f32, f32) -> f32 + Sync> Target for Analytic<F> {
+    type Workspace = Vec<u32>;
+
+    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, live: &mut Vec<u32>) {
+        proposals.begin(live);
+        proposals.draw(0, live);
+        for &lane in &*live {
+            let [x, y, ..] = proposals.block(0, lane as usize).map(unit_f32);
+            out.lanes[lane as usize] = Contribution::settle([x, 0.5], Rgb::splat((self.0)(x, y))).0;
+        }
+    }
+}
+
+const COLUMNS: u32 = 16;
+const BLOCKS: usize = 16;
+
+struct Run {
+    normalisers: Normalisers,
+    uniform: Estimate,
+    /// Estimate of the integral over each column, times the number of columns.
+    image: Vec<f64>,
+    statistics: Vec<Statistics>,
+}
+
+/// Replica exchange as the renderer does it: a warm-up, then rounds of doubling length.
+fn run<F: Fn(f32, f32) -> f32 + Sync>(
+    g: F,
+    betas: &[f64],
+    combination: Combination,
+    uniform_draws: usize,
+    sweeps: u64,
+    seed: u64,
+) -> Run {
+    const LADDERS: usize = 8;
+    let target = Analytic(g);
+    let ladder = Arc::new(Ladder::new(betas.to_vec()));
+    let footprint = Footprint::new(Filter::Box, COLUMNS, 1);
+    let size = [COLUMNS as f32, 1.0];
+    let film = Accumulator::new(COLUMNS, 1, LAYERS, 1.0);
+    let mut splats = Splats::new(LAYERS);
+    let mut blocks: Vec<Block<Vec<u32>>> = (0..BLOCKS)
+        .map(|b| Block::new(ladder.clone(), Rng::new(seed), (b * LADDERS) as u32, LADDERS, uniform_draws))
+        .collect();
+    let mut counts = vec![1.0; betas.len()];
+    counts[0] = uniform_draws as f64;
+    let unit = 1.0;
+
+    let solve = |statistics: &[Statistics]| {
+        let groups: Vec<Group> = statistics
+            .iter()
+            .map(|s| Group { uniform: &s.uniform, tempered: &s.tempered, weights: &s.weights })
+            .collect();
+        Normalisers::solve(&ladder, &groups)
+    };
+    let warm_up = 64;
+    let mut recorder = Recorder { footprint: &footprint, size, splats: &mut splats };
+    for block in &mut blocks {
+        block.advance(&target, warm_up, Phase::WarmUp, &mut recorder);
+        block.flush(Phase::WarmUp, &mut recorder);
+    }
+    let (mut done, mut length) = (0, 64);
+    while done < sweeps {
+        let statistics: Vec<Statistics> = blocks.iter().map(|b| b.snapshot(Phase::WarmUp, &mut recorder)).collect();
+        let weights = Weights::new(combination, &ladder, &solve(&statistics).ln_z, &counts, unit);
+        for block in &mut blocks {
+            block.advance(&target, length, Phase::Round(&weights), &mut recorder);
+            block.flush(Phase::Round(&weights), &mut recorder);
+        }
+        done += length;
+        length *= 2;
+    }
+    let statistics: Vec<Statistics> = blocks.iter().map(|b| b.snapshot(Phase::WarmUp, &mut recorder)).collect();
+    film.deposit(&mut splats);
+    let normalisers = solve(&statistics);
+    let samples = (done as usize * BLOCKS * LADDERS) as f64 / f64::from(COLUMNS);
+    let hot = film.layer(layer::HOT);
+    let tempered = film.layer(layer::TEMPERED);
+    let c = normalisers.target.value;
+    let image = (0..COLUMNS as usize)
+        .map(|i| hot[i][0] / (samples * uniform_draws as f64) + tempered[i][0] / samples * c / unit);
+    let sums: Vec<(f64, f64)> = statistics.iter().map(|s| s.uniform_sum).collect();
+    Run { image: image.collect(), uniform: uniform_mean(&sums), normalisers, statistics }
+}
+
+/// Two peaks of different width on a dim floor.
+fn peaks(x: f32, y: f32) -> f32 {
+    let bump = |cx: f32, cy: f32, r: f32| (-((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * r * r)).exp();
+    0.02 + bump(0.25, 0.5, 0.05) + 4.0 * bump(0.8, 0.3, 0.02)
+}
+
+/// Integral of a function over each column of the unit square, times the number of columns, by the midpoint rule.
+fn columns(g: impl Fn(f32, f32) -> f32) -> Vec<f64> {
+    let n = 128;
+    (0..COLUMNS)
+        .map(|column| {
+            let mut sum = 0.0;
+            for i in 0..n {
+                for j in 0..n * 8 {
+                    let x = (column as f32 + (i as f32 + 0.5) / n as f32) / COLUMNS as f32;
+                    sum += f64::from(g(x, (j as f32 + 0.5) / (8 * n) as f32));
+                }
+            }
+            sum / f64::from(8 * n * n)
+        })
+        .collect()
+}
+
+fn ln_z(g: impl Fn(f32, f32) -> f32, beta: f64) -> f64 {
+    let tempered = columns(|x, y| f64::from(g(x, y)).powf(beta) as f32);
+    (tempered.iter().sum::<f64>() / f64::from(COLUMNS)).ln()
+}
+
+/// Over 12 independent runs of each ladder and combination, the mean of each column is within 4.5 standard errors of
+/// the truth (16 columns × 8 cases: level 10⁻³ together).
+#[test]
+fn images_of_every_ladder_and_combination_agree_with_the_integrals() {
+    let truth = columns(peaks);
+    for betas in [&[0.0, 1.0][..], &[0.0, 0.5, 1.0], &[0.0, 0.2, 0.4, 0.7, 1.0], &[0.0, 0.01, 1.0]] {
+        for combination in [Combination::Target, Combination::Balance] {
+            let runs: Vec<Vec<f64>> = (0..12).map(|s| run(peaks, betas, combination, 1, 2000, s).image).collect();
+            for (i, truth) in truth.iter().enumerate() {
+                let n = runs.len() as f64;
+                let mean = runs.iter().map(|r| r[i]).sum::<f64>() / n;
+                let variance = runs.iter().map(|r| (r[i] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+                let error = (variance / n).sqrt();
+                assert!(
+                    (mean - truth).abs() < 4.5 * error + 0.002 * truth,
+                    "{betas:?} {combination:?}, column {i}: {mean} ± {error} for {truth}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn normalisers_of_all_rungs_agree_with_the_integrals() {
+    let betas = [0.0, 0.2, 0.4, 0.7, 1.0];
+    let r = run(peaks, &betas, Combination::Balance, 1, 8000, 5);
+    for (beta, got) in betas.iter().zip(&r.normalisers.ln_z) {
+        let exact = ln_z(peaks, *beta);
+        assert!((got - exact).abs() < 0.03, "β = {beta}: {got} for {exact}");
+    }
+    let c = r.normalisers.target;
+    assert!((c.value.ln() - ln_z(peaks, 1.0)).abs() < 4.0 * c.standard_error / c.value, "{c:?}");
+    assert!((r.uniform.value.ln() - ln_z(peaks, 1.0)).abs() < 4.0 * r.uniform.standard_error / c.value);
+    assert!(c.standard_error < r.uniform.standard_error, "the ladder knows more than its uniform rung");
+}
+
+#[test]
+fn every_rung_has_its_share_of_states() {
+    let r = run(peaks, &[0.0, 0.3, 1.0], Combination::Balance, 2, 1000, 1);
+    for s in &r.statistics {
+        assert!((s.weights[1] - s.weights[2]).abs() < 20.0, "{:?}", s.weights);
+    }
+}
+
+#[test]
+fn a_dark_target_gives_a_dark_image_and_nothing_else() {
+    let r = run(|_, _| 0.0, &[0.0, 0.5, 1.0], Combination::Balance, 1, 100, 1);
+    assert!(r.image.iter().all(|v| *v == 0.0));
+    assert_eq!(r.normalisers.target.value, 0.0);
+}
+
+#[test]
+fn a_constant_target_has_its_constant_everywhere() {
+    let r = run(|_, _| 3.0, &[0.0, 0.5, 1.0], Combination::Balance, 1, 4000, 1);
+    assert!((r.normalisers.target.value - 3.0).abs() < 1e-4, "{:?}", r.normalisers);
+    for v in r.image {
+        assert!((v - 3.0).abs() < 0.1, "{v}");
+    }
+}
