@@ -1,1 +1,41 @@
-//! Files to scene descriptions: one file a format.
+//! Files to scene descriptions: one folder or file a format.
+//!
+//! A reader goes on after a fault, so that one [`LoadError`] tells all that is wrong with a file. To add a format:
+//! a new module and a line in [`FORMATS`].
+
+mod faults;
+mod mitsuba;
+
+use std::path::Path;
+
+pub use faults::{Fault, LoadError};
+
+use crate::scene::SceneDescription;
+
+/// Makes a description of the scene from the text of a file at a path, with the `-D` values given.
+type Reader = fn(&Path, String, &[(String, String)]) -> Result<SceneDescription, LoadError>;
+
+/// File name extensions and their readers.
+const FORMATS: &[(&str, Reader)] = &[("xml", mitsuba::read)];
+
+/// Reads the scene file at `path`; `defines` are `-D` names and values, which go before defaults in the file.
+pub fn scene(path: &Path, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {
+    let read = reader(path)?;
+    let bytes = std::fs::read(path).map_err(|error| LoadError::of_file(path, format!("cannot be read: {error}")))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let place = error.utf8_error().valid_up_to();
+        LoadError::of_file(path, format!("is not UTF-8 text: invalid at byte {place}"))
+    })?;
+    read(path, text, defines)
+}
+
+/// The reader of the format that the file name's extension stands for.
+fn reader(path: &Path) -> Result<Reader, LoadError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if let Some((_, read)) = FORMATS.iter().find(|(known, _)| *known == extension) {
+        return Ok(*read);
+    }
+    let known: Vec<String> = FORMATS.iter().map(|(name, _)| format!(".{name}")).collect();
+    let given = if extension.is_empty() { "no extension".into() } else { format!("extension .{extension}") };
+    Err(LoadError::of_file(path, format!("is not a known scene format ({given}); known: {}", known.join(", "))))
+}

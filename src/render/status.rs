@@ -36,10 +36,12 @@ pub struct RunStart {
 /// Packet widths that were chosen, by kind of ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Packets {
-    /// For rays that look for the nearest surface.
-    pub closest: usize,
+    /// For camera rays.
+    pub camera: usize,
+    /// For rays after a bounce.
+    pub bounce: usize,
     /// For rays that ask whether a light is seen.
-    pub occlusion: usize,
+    pub shadow: usize,
 }
 
 /// Where a run stands.

@@ -1,0 +1,99 @@
+//! Mitsuba 3 scene files (XML, version 3).
+//!
+//! Text becomes a tree of known elements ([`document`]); plugins, one file each, read the elements through
+//! [`parameters`]; meshes load last, in parallel. Every step goes on after a fault.
+//!
+//! To add a plugin: a new file and one line in the registry of its folder.
+
+mod bsdfs;
+mod document;
+mod emitters;
+mod films;
+mod ids;
+mod integrators;
+mod parameters;
+mod registry;
+mod rfilters;
+mod samplers;
+mod sensors;
+mod shapes;
+mod transforms;
+mod values;
+
+use std::path::Path;
+
+use super::LoadError;
+use super::faults::{Faults, did_you_mean};
+use crate::scene::SceneDescription;
+use crate::scene::lights::Light;
+use document::Element;
+use ids::Ids;
+use parameters::ElementParameters;
+
+/// Reads the text of the scene file at `path`.
+pub fn read(path: &Path, text: String, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {
+    let faults = Faults::default();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let description = document::read(&text, defines, &faults).and_then(|scene| describe(&scene, folder, &faults));
+    faults.settle(path, text, description)
+}
+
+/// Reads the elements of the scene.
+fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDescription> {
+    let ids = Ids::new(scene, faults);
+    let mut bsdfs = bsdfs::Library::new(&ids, faults);
+    let mut p = ElementParameters::new(scene, faults);
+
+    let integrator = match p.single("integrator") {
+        Some(element) => integrators::read(element, faults),
+        None => Some(integrators::DEFAULT),
+    };
+    let sensor = p.single("sensor");
+    if sensor.is_none() {
+        faults.at(&scene.span, "the scene has no <sensor>");
+    }
+    let view = sensor.and_then(|element| sensors::read(element, faults));
+    let shape_elements = p.nested(&["shape"]);
+    let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, faults);
+    for element in p.nested(&["bsdf"]) {
+        bsdfs.bsdf(element); // those that no shape uses have faults as well
+    }
+    let light_elements = p.nested(&["emitter"]);
+    let lights = lights(&light_elements, faults);
+    let is_lit = !light_elements.is_empty() || shape_elements.iter().any(|shape| shape.children.iter().any(is_emitter));
+    if !is_lit {
+        faults.at(&scene.span, "nothing in the scene emits light: there is no <emitter>");
+    }
+    p.finish();
+
+    let (camera, film) = view?;
+    let (shapes, warnings) = shapes?;
+    Some(SceneDescription {
+        integrator: integrator?,
+        camera,
+        film,
+        materials: bsdfs.materials,
+        shapes,
+        lights,
+        warnings,
+    })
+}
+
+/// Whether an element is an emitter.
+fn is_emitter(element: &Element) -> bool {
+    element.tag == "emitter"
+}
+
+/// Emitters that are not part of shapes; only one of them can be all around.
+fn lights(elements: &[&Element], faults: &Faults) -> Vec<Light> {
+    let mut lights = Vec::new();
+    let mut is_surrounded = false;
+    for element in elements {
+        let Some(light) = emitters::of_scene(element, faults) else { continue };
+        if matches!(light, Light::Constant { .. }) && std::mem::replace(&mut is_surrounded, true) {
+            faults.at(&element.span, "the scene has more than one emitter that surrounds it");
+        }
+        lights.push(light);
+    }
+    lights
+}

@@ -1,0 +1,135 @@
+//! `<shape>`, one file a plugin.
+//!
+//! Reading an element only checks its parameters and gives a [`Build`]; builds, which read mesh files, then run in
+//! parallel.
+
+mod cube;
+mod disk;
+mod mesh;
+mod obj;
+mod ply;
+mod rectangle;
+mod sphere;
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::bsdfs::{Bare, Library};
+use super::document::Element;
+use super::emitters;
+use super::parameters::ElementParameters;
+use super::registry::Registry;
+use crate::load::faults::{Faults, Span};
+use crate::scene::Rgb;
+use crate::scene::description::{ShapeDescription, ShapeGeometry, Sides};
+use mesh::Repairs;
+
+const SHAPES: Registry<fn(&mut ElementParameters, &Path) -> Option<Build>> = Registry {
+    tag: "shape",
+    plugins: &[
+        ("cube", cube::read),
+        ("disk", disk::read),
+        ("obj", obj::read),
+        ("ply", ply::read),
+        ("rectangle", rectangle::read),
+        ("sphere", sphere::read),
+    ],
+};
+
+/// Makes the geometry, or says in a sentence why it cannot.
+pub type Build = Box<dyn FnOnce() -> Result<Built, String> + Send>;
+
+/// Geometry in world space, and what had to be repaired for it.
+pub struct Built {
+    geometry: ShapeGeometry,
+    repairs: Repairs,
+}
+
+impl From<ShapeGeometry> for Built {
+    fn from(geometry: ShapeGeometry) -> Built {
+        Built { geometry, repairs: Repairs::default() }
+    }
+}
+
+/// A shape but for its geometry.
+struct Pending {
+    name: String,
+    /// Where faults of the geometry are shown.
+    span: Span,
+    /// Sides and emission, unless one of them is faulty.
+    parts: Option<(Sides, Option<Rgb>)>,
+    build: Build,
+}
+
+/// Reads all shapes; gives warnings as well. `None` where one is faulty.
+pub fn read<'a>(
+    elements: &[&'a Element],
+    folder: &Path,
+    bsdfs: &mut Library<'a>,
+    faults: &'a Faults,
+) -> Option<(Vec<ShapeDescription>, Vec<String>)> {
+    let pending: Vec<_> = elements.iter().enumerate().map(|(i, e)| pending(i, e, folder, bsdfs, faults)).collect();
+    let built: Vec<_> =
+        pending.into_par_iter().map(|shape| shape.map(|s| (s.name, s.span, s.parts, (s.build)()))).collect();
+
+    let mut shapes = Some(Vec::new());
+    let mut repairs = Repairs::default();
+    for shape in built {
+        let described = shape.and_then(|(name, span, parts, result)| {
+            let built = result.map_err(|message| faults.at(&span, message)).ok()?;
+            repairs += built.repairs;
+            let (sides, emission) = parts?;
+            Some(ShapeDescription { name, geometry: built.geometry, sides, emission })
+        });
+        shapes = shapes.zip(described).map(|(mut shapes, shape)| {
+            shapes.push(shape);
+            shapes
+        });
+    }
+    Some((shapes?, repairs.warnings()))
+}
+
+/// Reads one element.
+fn pending<'a>(
+    index: usize,
+    element: &'a Element,
+    folder: &Path,
+    bsdfs: &mut Library<'a>,
+    faults: &'a Faults,
+) -> Option<Pending> {
+    let mut p = ElementParameters::new(element, faults);
+    let surface = p.nested(&["bsdf", "ref"]);
+    for surplus in surface.iter().skip(1) {
+        faults.at(&surplus.span, "the shape has more than one <bsdf>");
+    }
+    let emitter = p.single("emitter");
+    let emission = emitter.map(|emitter| emitters::of_shape(emitter, faults));
+    let sides = match surface.first() {
+        Some(surface) => bsdfs.sides(surface),
+        None if emitter.is_some() => Some(bsdfs.bare_sides(Bare::Black)),
+        None => Some(bsdfs.bare_sides(Bare::Grey)),
+    };
+    let build = SHAPES.find(element, faults).and_then(|read| {
+        let build = read(&mut p, folder);
+        p.finish();
+        build
+    })?;
+    let parts = match (sides, emission) {
+        (Some(sides), None) => Some((sides, None)),
+        (Some(sides), Some(Some(emission))) => Some((sides, Some(emission))),
+        _ => None,
+    };
+    let file = element.children.iter().find(|c| c.attribute("name").is_some_and(|a| a.value == "filename"));
+    let span = file.map_or(element.span_of("type"), |file| file.span_of("value")).clone();
+    let name = match element.attribute("id") {
+        Some(id) => id.value.clone(),
+        None => format!("{} {}", element.value("type"), index + 1),
+    };
+    Some(Pending { name, span, parts, build })
+}
+
+/// The mesh file that `filename` names, beside the scene file.
+fn file(p: &mut ElementParameters, folder: &Path) -> Option<PathBuf> {
+    p.required_string("filename").map(|name| folder.join(name))
+}
