@@ -1,8 +1,69 @@
 //! Command lines to typed jobs: one file a subcommand.
 
+mod failure;
+mod info;
+mod render;
+mod scene;
+mod signals;
+mod values;
+
+use std::io::{self, Write};
 use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Renders images by replica-exchange light transport: many Metropolis chains on ladders of inverse temperatures.
+#[derive(Parser)]
+#[command(name = "relt", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::Render),
+    Info(info::Info),
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
+  1    something failed while running, such as a full disk
+  2    nothing was begun: faulty options or scene, no Embree, unwritable files
+  130  ended at once by a second signal, without an image";
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
-    ExitCode::SUCCESS
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            // Help and version are messages too, to standard output and with code 0.
+            drop(message.print());
+            return ExitCode::from(message.exit_code() as u8);
+        }
+    };
+    let done = match arguments.command {
+        Command::Render(arguments) => render::run(arguments),
+        Command::Info(arguments) => info::run(arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            // A closed standard error is no reason to panic; the code still tells.
+            drop(write!(io::stderr(), "{failure}"));
+            failure.code()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
 }

@@ -51,6 +51,31 @@ pub struct Workspace {
     shadow_rays: Rays,
     shadow_contributions: Vec<Rgb>,
     occluded: Vec<bool>,
+    /// Rays of every kind as they are traced, where somebody asked for them.
+    recording: Option<RecordedRays>,
+}
+
+/// The rays of some evaluations, batch by batch, for measuring Embree alone.
+#[derive(Default)]
+pub struct RecordedRays {
+    /// Camera rays.
+    pub camera: Vec<Rays>,
+    /// Rays after a bounce.
+    pub bounce: Vec<Rays>,
+    /// Shadow rays.
+    pub shadow: Vec<Rays>,
+}
+
+impl Workspace {
+    /// A workspace that keeps a copy of every ray.
+    pub fn recording() -> Workspace {
+        Workspace { recording: Some(RecordedRays::default()), ..Workspace::default() }
+    }
+
+    /// The rays kept since the last call.
+    pub fn take_recorded(&mut self) -> RecordedRays {
+        self.recording.as_mut().map(std::mem::take).unwrap_or_default()
+    }
 }
 
 impl<'s> Mapping<'s> {
@@ -137,6 +162,9 @@ fn trace(mapping: &Mapping, bounce: u16, w: &mut Workspace, out: &mut Contributi
     let width = if bounce == 0 { mapping.widths.camera } else { mapping.widths.bounce };
     mapping.scene.tracer.closest(width, &w.rays, &mut w.hits);
     out.rays += w.rays.len() as u64;
+    if let Some(recording) = &mut w.recording {
+        (if bounce == 0 { &mut recording.camera } else { &mut recording.bounce }).push(w.rays.clone());
+    }
 }
 
 /// Adds the background to the paths that left the scene and lists the others.
@@ -194,6 +222,9 @@ fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &
 fn connect(mapping: &Mapping, w: &mut Workspace, out: &mut Contributions) {
     mapping.scene.tracer.occluded(mapping.widths.shadow, &w.shadow_rays, &mut w.occluded);
     out.rays += w.shadow_rays.len() as u64;
+    if let Some(recording) = &mut w.recording {
+        recording.shadow.push(w.shadow_rays.clone());
+    }
     for ((&lane, &contribution), &occluded) in w.shadow_lanes.iter().zip(&w.shadow_contributions).zip(&w.occluded) {
         if !occluded {
             w.radiance[lane as usize] += contribution;

@@ -1,1 +1,19 @@
-//! (being written)
+//! From a job to files: settings, budgets, progress, log, output.
+
+mod baseline;
+pub mod calibration;
+pub mod engine;
+pub mod log;
+pub mod output;
+mod path_tracer;
+mod plan;
+pub mod progress;
+mod replica_exchange;
+mod run;
+pub mod settings;
+pub mod status;
+
+pub use output::{Output, Picture};
+pub use run::{Job, Outcome, RenderError, run};
+pub use settings::{Combine, LadderChoice, Method, PacketChoice, Settings};
+pub use status::{Observer, RunStart, Status, Summary};

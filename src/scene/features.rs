@@ -78,6 +78,28 @@ impl Features {
         }
     }
 
+    /// One short phrase for each thing in use.
+    pub fn in_words(&self) -> Vec<String> {
+        let mut words: Vec<String> = self.materials.iter().map(|(name, n)| format!("{n} {name}")).collect();
+        let shapes = &self.shapes;
+        for (n, what) in [
+            (self.triangles, "triangles"),
+            (shapes.flat_meshes, "flat meshes"),
+            (shapes.smooth_meshes, "meshes with shading normals"),
+            (shapes.spheres, "spheres"),
+            (shapes.disks, "disks"),
+            (self.area_lights, "area lights"),
+            (self.point_lights, "point lights"),
+            (self.infinite_lights, "lights at infinity"),
+        ] {
+            if n > 0 {
+                words.push(format!("{n} {what}"));
+            }
+        }
+        words.push(format!("{} kernel", self.kernel().name()));
+        words
+    }
+
     /// Number of lights of all kinds.
     pub fn lights(&self) -> usize {
         self.area_lights + self.point_lights + self.infinite_lights

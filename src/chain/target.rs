@@ -1,0 +1,85 @@
+//! What chains need to know of the function they sample.
+
+use crate::{
+    path::{Contributions, unidirectional},
+    rng::{Counter, Rng},
+    sample::{Move, Points, Proposals, StepLaw},
+};
+
+/// A non-negative function on the unit cube, evaluated for a batch of points at a time.
+///
+/// Chains and ladders see nothing else of a scene: their statistics are tested on analytic targets.
+pub trait Target: Sync {
+    /// Memory that an evaluation reuses.
+    type Workspace: Default + Send;
+
+    /// Evaluates the proposals of all lanes that do not rest, drawing the blocks it needs.
+    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace);
+}
+
+impl Target for unidirectional::Mapping<'_> {
+    type Workspace = unidirectional::Workspace;
+
+    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
+        unidirectional::Mapping::evaluate(self, proposals, out, workspace);
+    }
+}
+
+/// Everything that one batch of proposals takes: moves, counters, proposed points and their contributions.
+pub struct Evaluator<W> {
+    rng: Rng,
+    law: StepLaw,
+    /// How each lane moves next.
+    pub moves: Vec<Move>,
+    /// Which words each lane draws next.
+    pub counters: Vec<Counter>,
+    /// The proposed points.
+    pub points: Points,
+    /// What they contribute.
+    pub out: Contributions,
+    workspace: W,
+}
+
+impl<W: Default> Evaluator<W> {
+    /// For as many lanes as there are counters; all lanes rest at first.
+    pub fn new(rng: Rng, law: StepLaw, counters: Vec<Counter>) -> Evaluator<W> {
+        Evaluator::with_workspace(rng, law, counters, W::default())
+    }
+
+    /// The same with a given workspace.
+    pub fn with_workspace(rng: Rng, law: StepLaw, counters: Vec<Counter>, workspace: W) -> Evaluator<W> {
+        let lanes = counters.len();
+        Evaluator {
+            rng,
+            law,
+            moves: vec![Move::Rest; lanes],
+            counters,
+            points: Points::new(lanes),
+            out: Contributions::new(lanes),
+            workspace,
+        }
+    }
+
+    /// What evaluations work in.
+    pub fn workspace(&mut self) -> &mut W {
+        &mut self.workspace
+    }
+
+    /// The source of random words.
+    pub fn rng(&self) -> Rng {
+        self.rng
+    }
+
+    /// Draws and evaluates a proposal in every lane that does not rest; small steps start at `current`.
+    pub fn evaluate<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points) {
+        let mut proposals = Proposals {
+            rng: self.rng,
+            current,
+            points: &mut self.points,
+            counters: &self.counters,
+            moves: &self.moves,
+            law: self.law,
+        };
+        target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
+    }
+}

@@ -1,0 +1,83 @@
+//! States of many chains.
+
+use super::acceptance;
+use crate::{
+    path::Contribution,
+    sample::{Move, Points},
+};
+
+/// The current states of a batch of chains, each with the expected weight it has gathered and not yet recorded.
+///
+/// A chain starts without a state (its contribution is dark). It leaves that by its first lit proposal or swap.
+pub struct Walkers {
+    /// Where each chain is.
+    pub points: Points,
+    /// What it contributes there.
+    pub states: Vec<Contribution>,
+    /// Expected weight since the state was entered or last recorded.
+    pub pending: Vec<f64>,
+}
+
+impl Walkers {
+    /// `lanes` chains without states.
+    pub fn new(lanes: usize) -> Walkers {
+        Walkers { points: Points::new(lanes), states: vec![Contribution::NONE; lanes], pending: vec![0.0; lanes] }
+    }
+
+    /// The move of a chain that explores by small steps: from nowhere only a fresh point can be proposed.
+    #[inline(always)]
+    pub fn exploring(&self, lane: usize) -> Move {
+        if self.states[lane].is_dark() { Move::Fresh } else { Move::Small }
+    }
+
+    /// One Metropolis step of a chain at inverse temperature `beta` towards lane `from` of the proposals: both
+    /// states are weighted by their probabilities, whatever `u`, uniform in (0, 1), then decides.
+    ///
+    /// `record` receives states with their expected weights, once nothing more will be added to them; the weights
+    /// of a step sum to one, unless chain and proposal are both dark. Returns the acceptance probability.
+    #[inline(always)]
+    pub fn step(
+        &mut self,
+        lane: usize,
+        beta: f64,
+        (points, from): (&Points, usize),
+        proposed: &Contribution,
+        u: f64,
+        record: &mut impl FnMut(&Contribution, f64),
+    ) -> f64 {
+        let alpha = acceptance(beta, self.states[lane].ln_g, proposed.ln_g);
+        if !self.states[lane].is_dark() {
+            self.pending[lane] += 1.0 - alpha;
+        }
+        if u < alpha {
+            self.replace(lane, (points, from), proposed, record);
+            self.pending[lane] = alpha;
+        } else if alpha > 0.0 {
+            record(proposed, alpha);
+        }
+        alpha
+    }
+
+    /// Puts a chain into a new state, with no weight yet; the old one is recorded.
+    #[inline(always)]
+    pub fn replace(
+        &mut self,
+        lane: usize,
+        (points, from): (&Points, usize),
+        state: &Contribution,
+        record: &mut impl FnMut(&Contribution, f64),
+    ) {
+        self.flush(lane, record);
+        self.points.copy(lane, points, from);
+        self.states[lane] = *state;
+    }
+
+    /// Records what the chain's state has gathered.
+    #[inline(always)]
+    pub fn flush(&mut self, lane: usize, record: &mut impl FnMut(&Contribution, f64)) {
+        let weight = std::mem::replace(&mut self.pending[lane], 0.0);
+        if weight > 0.0 {
+            record(&self.states[lane], weight);
+        }
+    }
+}

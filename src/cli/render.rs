@@ -1,0 +1,347 @@
+//! `relt render`: from a scene file to an image.
+
+use std::path::{Path, PathBuf, absolute};
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::AtomicBool;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::scene::{Opened, SceneArguments};
+use super::{signals, values};
+use crate::render::log::{self, Log};
+use crate::render::progress::Progress;
+use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
+use crate::render::{
+    Combine, LadderChoice, Method, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary,
+};
+
+/// Renders a scene to an OpenEXR image with a PNG preview
+#[derive(Args)]
+#[command(after_help = super::EXIT_CODES)]
+pub(super) struct Render {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Image to write: .exr (32-bit floats, with a .png preview beside it) or .png (preview only)
+    /// [default: the scene's folder's name with .exr, in the current folder]
+    #[arg(short, long, value_name = "FILE", help_heading = "Files")]
+    output: Option<PathBuf>,
+
+    /// Writes the image so far at this interval, such as 10s
+    #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
+    snapshot: Option<Duration>,
+
+    /// Writes a log, one JSON object a line
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    log: Option<PathBuf>,
+
+    /// Shows nothing but errors
+    #[arg(short, long, help_heading = "Files")]
+    quiet: bool,
+
+    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
+    #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
+    method: Method,
+
+    /// Replicas on a ladder for --method re, 2 to 1024, the uniform one included [default: 4]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Method")]
+    replicas: Option<u32>,
+
+    /// Inverse temperatures for --method re in place of --replicas, rising from 0 to 1, such as 0,0.3,1
+    #[arg(long, value_name = "0,…,1", value_delimiter = ',', allow_negative_numbers = true, help_heading = "Method")]
+    betas: Option<Vec<f64>>,
+
+    /// How --method re makes one image of its replicas; balance: from all of them; target: from the coldest
+    /// [default: balance]
+    #[arg(long, value_parser = values::combine(), help_heading = "Method")]
+    combine: Option<Combine>,
+
+    /// Mutations per pixel, above 0; the same seed and number give the same image, bit by bit
+    /// [default: 64 unless --time is given; with both, whichever ends first]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
+    mpp: Option<f64>,
+
+    /// Wall time to render for, such as 60s or 5m
+    #[arg(long, value_parser = values::duration, allow_hyphen_values = true, help_heading = "Budget")]
+    time: Option<Duration>,
+
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Budget")]
+    seed: u64,
+
+    /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
+    threads: Option<usize>,
+
+    /// Keeps every worker thread on a core of its own
+    #[arg(long, help_heading = "Machine")]
+    pin: bool,
+
+    /// Rays that go to Embree at a time; auto measures at start; the image does not depend on it
+    #[arg(long, value_name = "RAYS", default_value = "auto", value_parser = values::packet(), help_heading = "Machine")]
+    packet: PacketChoice,
+}
+
+/// Runs the subcommand.
+pub(super) fn run(arguments: Render) -> Result<(), Failure> {
+    let settings = arguments.settings()?;
+    let output = arguments.output()?;
+    let opened = arguments.scene.open()?;
+    let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
+    let stop = signals::stop_flag()?;
+    let progress = Progress::new(arguments.quiet, stop.clone());
+    for warning in &opened.warnings {
+        progress.say(&format!("warning: {warning}"));
+    }
+    let audience = Audience { snapshots: arguments.snapshot.map(Snapshots::every), output: &output, log, progress };
+
+    let outcome = render(&arguments.scene.path, &opened, &settings, &audience, &stop)?;
+
+    output.write(&outcome.picture).map_err(Failure::running)?;
+    audience.finished(&Summary {
+        status: outcome.status,
+        outputs: output.files(),
+        interrupted: outcome.interrupted,
+        warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
+    });
+    Ok(())
+}
+
+/// What a run leaves behind.
+struct Outcome {
+    picture: Picture,
+    status: Status,
+    interrupted: bool,
+    warnings: Vec<String>,
+}
+
+/// CONNECT: `crate::render::run(Job { scene, settings, stop, … }, audience)`, its errors by `Failure::running`.
+fn render(
+    _path: &Path,
+    _opened: &Opened,
+    _settings: &Settings,
+    _audience: &dyn Observer,
+    _stop: &Arc<AtomicBool>,
+) -> Result<Outcome, Failure> {
+    Err(Failure::running("this build does not render yet"))
+}
+
+impl Render {
+    /// The run that is asked for, or everything that is wrong with it.
+    fn settings(&self) -> Result<Settings, Failure> {
+        let no_budget = self.mpp.is_none() && self.time.is_none();
+        let settings = Settings {
+            method: self.method,
+            seed: self.seed,
+            threads: self.threads,
+            pin: self.pin,
+            mutations_per_pixel: if no_budget { Some(DEFAULT_MUTATIONS_PER_PIXEL) } else { self.mpp },
+            time: self.time,
+            ladder: match (&self.betas, self.replicas) {
+                (Some(betas), _) => LadderChoice::Betas(betas.clone()),
+                (None, Some(k)) => LadderChoice::Replicas(k),
+                (None, None) => LadderChoice::default(),
+            },
+            combine: self.combine.unwrap_or_default(),
+            packet: self.packet,
+        };
+        let mut faults = self.contradictions();
+        faults.extend(settings.faults());
+        if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
+    }
+
+    /// What is wrong with the options beside one another, which the settings no longer tell.
+    fn contradictions(&self) -> Vec<String> {
+        let mut faults = self.scene.faults();
+        if self.betas.is_some() && self.replicas.is_some() {
+            faults.push("--betas and --replicas: give one of them; the number of replicas is that of the betas".into());
+        }
+        let of_a_ladder = [
+            ("--replicas", self.replicas.is_some()),
+            ("--betas", self.betas.is_some()),
+            ("--combine", self.combine.is_some()),
+        ];
+        if self.method != Method::ReplicaExchange {
+            let method = self.method.name();
+            let given = of_a_ladder.iter().filter(|(_, given)| *given);
+            faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
+        }
+        let cores = available_parallelism().map_or(1, usize::from);
+        if let Some(threads) = self.threads.filter(|threads| self.pin && *threads > cores) {
+            faults.push(format!("--pin: {threads} threads cannot have a core each, relt may use {cores}"));
+        }
+        faults
+    }
+
+    /// Where the image goes; all files of the run are known to be writable afterwards.
+    fn output(&self) -> Result<Output, Failure> {
+        let path = self.output.clone().unwrap_or_else(|| default_output(&self.scene.path));
+        let output = Output::new(&path).map_err(Failure::input)?;
+        if let Some(log) = &self.log {
+            let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
+            if output.files().iter().any(|file| place(file) == place(log)) {
+                return Err(Failure::input(format_args!("--log {}: the image goes there", log.display())));
+            }
+            if place(log) == place(&self.scene.path) {
+                return Err(Failure::input(format_args!("--log {}: that is the scene", log.display())));
+            }
+            log::check(log).map_err(Failure::input)?;
+        }
+        output.check().map_err(Failure::input)?;
+        Ok(output)
+    }
+}
+
+/// The scene's folder's name with `.exr`, in the current folder: scene files are mostly named alike.
+fn default_output(scene: &Path) -> PathBuf {
+    let scene = absolute(scene).unwrap_or_else(|_| scene.to_owned());
+    let name = scene.parent().and_then(Path::file_name).or(scene.file_stem()).unwrap_or("relt".as_ref());
+    let mut file = name.to_owned();
+    file.push(".exr");
+    PathBuf::from(file)
+}
+
+/// All who follow a run: the person, the log, and the image file of snapshots.
+struct Audience<'a> {
+    progress: Progress,
+    log: Option<Log>,
+    snapshots: Option<Snapshots>,
+    output: &'a Output,
+}
+
+/// When the next snapshot is due.
+struct Snapshots {
+    interval: Duration,
+    due: Mutex<Duration>,
+}
+
+impl Snapshots {
+    fn every(interval: Duration) -> Snapshots {
+        Snapshots { interval, due: Mutex::new(interval) }
+    }
+
+    fn is_due(&self, elapsed: Duration) -> bool {
+        elapsed >= *self.due.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts from now, so that slow files do not make snapshots follow one another without a pause.
+    fn taken(&self, elapsed: Duration) {
+        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = elapsed + self.interval;
+    }
+}
+
+impl Observer for Audience<'_> {
+    fn started(&self, start: &RunStart) {
+        self.progress.started(start);
+        self.log.iter().for_each(|log| log.started(start));
+    }
+
+    fn progress(&self, status: &Status) {
+        self.progress.progress(status);
+        self.log.iter().for_each(|log| log.progress(status));
+    }
+
+    fn wants_picture(&self, status: &Status) -> bool {
+        self.snapshots.as_ref().is_some_and(|snapshots| snapshots.is_due(status.elapsed))
+    }
+
+    fn snapshot(&self, status: &Status, picture: &Picture) {
+        self.snapshots.iter().for_each(|snapshots| snapshots.taken(status.elapsed));
+        match self.output.write(picture) {
+            Ok(()) => self.log.iter().for_each(|log| log.snapshot(status, picture)),
+            // The disk may have room again when the run is over.
+            Err(error) => self.progress.say(&format!("warning: {error}")),
+        }
+    }
+
+    fn finished(&self, summary: &Summary) {
+        self.log.iter().for_each(|log| log.finished(summary));
+        self.progress.finished(summary);
+        if let Some(failure) = self.log.as_ref().and_then(Log::failure) {
+            self.progress.say(&format!("warning: the log is incomplete: {failure}"));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        render: Render,
+    }
+
+    fn settings(arguments: &[&str]) -> Result<Settings, String> {
+        let arguments = ["relt", "scene.xml"].iter().chain(arguments);
+        Only::try_parse_from(arguments).unwrap().render.settings().map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn without_options_the_settings_are_the_defaults() {
+        assert_eq!(settings(&[]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn every_option_reaches_the_settings() {
+        let given = "--method re --betas 0,0.25,1 --combine target --mpp 10 --time 5m --seed 7 --threads 1 --pin";
+        let given: Vec<_> = given.split(' ').collect();
+        let expected = Settings {
+            method: Method::ReplicaExchange,
+            seed: 7,
+            threads: Some(1),
+            pin: true,
+            mutations_per_pixel: Some(10.0),
+            time: Some(Duration::from_secs(300)),
+            ladder: LadderChoice::Betas(vec![0.0, 0.25, 1.0]),
+            combine: Combine::Target,
+            packet: PacketChoice::Auto,
+        };
+        assert_eq!(settings(&given), Ok(expected));
+        let mlt = settings(&["--method", "mlt", "--packet", "8", "--replicas"][..4]).unwrap();
+        assert_eq!((mlt.method, mlt.packet), (Method::Mlt, PacketChoice::Fixed(crate::embree::Width::W8)));
+        assert_eq!(settings(&["--replicas", "6"]).unwrap().ladder, LadderChoice::Replicas(6));
+    }
+
+    #[test]
+    fn a_time_alone_has_no_limit_in_mutations() {
+        assert_eq!(settings(&["--time", "1s"]).unwrap().mutations_per_pixel, None);
+    }
+
+    #[test]
+    fn options_that_contradict_one_another_are_all_told() {
+        let text = settings(&["--method", "path", "--betas", "0,1", "--replicas", "1", "--mpp", "0"]).unwrap_err();
+        for part in ["--betas and --replicas", "--betas: --method path has no ladder", "--replicas: ", "--mpp 0"] {
+            assert!(text.contains(part), "{part:?} is not in:\n{text}");
+        }
+        assert_eq!(text.lines().count(), 4, "{text}");
+    }
+
+    #[test]
+    fn the_image_is_named_after_the_scenes_folder() {
+        assert_eq!(default_output(Path::new("scenes/cornell-box/scene.xml")), Path::new("cornell-box.exr"));
+        assert_eq!(default_output(Path::new("/scene.xml")), Path::new("scene.exr"));
+        let here = std::env::current_dir().unwrap();
+        let mut here = here.file_name().unwrap().to_owned();
+        here.push(".exr");
+        assert_eq!(default_output(Path::new("scene.xml")), Path::new(&here));
+    }
+
+    #[test]
+    fn snapshots_keep_their_distance() {
+        let snapshots = Snapshots::every(Duration::from_secs(10));
+        assert!(!snapshots.is_due(Duration::from_secs(9)));
+        assert!(snapshots.is_due(Duration::from_secs(25)));
+        snapshots.taken(Duration::from_secs(25));
+        assert!(!snapshots.is_due(Duration::from_secs(34)));
+        assert!(snapshots.is_due(Duration::from_secs(35)));
+    }
+}

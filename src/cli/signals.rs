@@ -1,0 +1,23 @@
+//! Ctrl-C, SIGTERM and SIGHUP: the first ends a run with the image of what is done, the second ends it at once.
+
+use std::process;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use super::failure::Failure;
+
+/// What shells expect of a program that Ctrl-C ended.
+const ENDED_AT_ONCE: i32 = 130;
+
+/// The flag that the first signal raises.
+pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = stop.clone();
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Relaxed) {
+            process::exit(ENDED_AT_ONCE);
+        }
+    })
+    .map_err(|error| Failure::running(format_args!("cannot listen to Ctrl-C: {error}")))?;
+    Ok(stop)
+}

@@ -1,0 +1,182 @@
+//! `mlt`: the paper's two-pass baseline. First the normalisation c from M independent samples, then chains that start
+//! from states resampled among them in proportion to g; image = c/N Σ f/g.
+
+use rayon::prelude::*;
+
+use super::{
+    engine::{Counts, Development, Engine, Stage, layer_with, mean},
+    plan::Plan,
+};
+use crate::{
+    chain::{Baseline, Evaluator, Start},
+    film::{Accumulator, Plane, Splats},
+    path::unidirectional::Workspace,
+    rng::{Counter, Purpose, open_unit_f64},
+    sample::{Move, Points, StepLaw},
+    tempering::{Estimate, uniform_mean},
+};
+
+/// Independent samples of the first pass; half of the budget where that is less.
+const BOOTSTRAP: u64 = 100_000;
+/// Samples evaluated together in the first pass.
+const BOOTSTRAP_BATCH: u64 = 1024;
+
+/// The method at work.
+pub struct TwoPassMlt {
+    plan: Plan,
+    film: Accumulator,
+    blocks: Vec<Block>,
+    bootstrap: u64,
+    bootstrap_rays: u64,
+    bootstrap_faults: u64,
+    normalisation: Estimate,
+}
+
+struct Block {
+    chains: Baseline<Workspace>,
+    splats: Splats,
+}
+
+impl TwoPassMlt {
+    /// Does the first pass and puts the chains into their first states.
+    pub fn new(stage: &Stage, mutations: Option<u64>) -> TwoPassMlt {
+        let bootstrap = mutations.map_or(BOOTSTRAP, |n| BOOTSTRAP.min(n / 2).max(1));
+        let plan = Plan::new(mutations.map(|n| n.saturating_sub(bootstrap).max(1)), 1);
+        let batches = first_pass(stage, bootstrap);
+        let groups: Vec<(f64, f64)> =
+            batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
+        let normalisation = uniform_mean(&groups);
+        let ln_g: Vec<f64> = batches.iter().flat_map(|b| b.ln_g.iter().copied()).collect();
+        // a black scene has no state to start from: no chains, a black image
+        let starts = resample(stage, &ln_g, plan.blocks * plan.lanes());
+        let blocks = starts
+            .par_chunks(plan.lanes())
+            .enumerate()
+            .map(|(i, starts)| Block {
+                chains: Baseline::new(&stage.mapping, stage.rng, (i * plan.lanes()) as u32, starts),
+                splats: Splats::new(1),
+            })
+            .collect();
+        TwoPassMlt {
+            plan,
+            film: stage.accumulator(1),
+            blocks,
+            bootstrap,
+            bootstrap_rays: batches.iter().map(|b| b.rays).sum(),
+            bootstrap_faults: batches.iter().map(|b| b.faults).sum(),
+            normalisation,
+        }
+    }
+
+    /// The magnitude that states are kept in on the film: c itself.
+    fn unit(&self) -> f64 {
+        self.normalisation.value
+    }
+}
+
+/// What one batch of the first pass found.
+struct Batch {
+    ln_g: Vec<f64>,
+    rays: u64,
+    faults: u64,
+}
+
+fn bootstrap_counter(sample: u64) -> Counter {
+    Counter { ladder: 0, replica: 0, step: sample, purpose: Purpose::Bootstrap }
+}
+
+fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
+    (0..samples.div_ceil(BOOTSTRAP_BATCH))
+        .into_par_iter()
+        .map(|batch| {
+            let samples = batch * BOOTSTRAP_BATCH..((batch + 1) * BOOTSTRAP_BATCH).min(samples);
+            let counters: Vec<Counter> = samples.map(bootstrap_counter).collect();
+            let mut evaluator = Evaluator::<Workspace>::new(stage.rng, StepLaw::KELEMEN, counters);
+            evaluator.moves.fill(Move::Fresh);
+            evaluator.evaluate(&stage.mapping, &Points::new(0));
+            let out = evaluator.out;
+            Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.non_finite }
+        })
+        .collect()
+}
+
+/// States for `chains` chains in proportion to g, by systematic resampling; none where all is dark.
+fn resample(stage: &Stage, ln_g: &[f64], chains: usize) -> Vec<Start> {
+    let largest = ln_g.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return Vec::new();
+    }
+    let weights: Vec<f64> = ln_g.iter().map(|l| libm::exp(l - largest)).collect();
+    let total: f64 = weights.iter().sum();
+    let counter = Counter { ladder: 0, replica: 0, step: 0, purpose: Purpose::Start };
+    let offset = open_unit_f64(stage.rng.words(counter, 0)[0]);
+    let mut starts = Vec::with_capacity(chains);
+    let mut cumulative = 0.0;
+    for (sample, weight) in weights.iter().enumerate() {
+        cumulative += weight;
+        while starts.len() < chains && (starts.len() as f64 + offset) / chains as f64 * total < cumulative {
+            starts.push(Start { counter: bootstrap_counter(sample as u64), ln_g: ln_g[sample] });
+        }
+    }
+    // rounding may leave the last thresholds above the last sum
+    let last = weights.iter().rposition(|w| *w > 0.0).expect("some sample is lit");
+    starts.resize(chains, Start { counter: bootstrap_counter(last as u64), ln_g: ln_g[last] });
+    starts
+}
+
+impl Engine for TwoPassMlt {
+    fn sweeps_wanted(&self) -> Option<u64> {
+        if self.blocks.is_empty() { Some(0) } else { self.plan.sweeps }
+    }
+
+    fn mutations_wanted(&self) -> Option<u64> {
+        self.sweeps_wanted().map(|s| s * self.plan.a_sweep() + self.bootstrap)
+    }
+
+    fn advance(&mut self, stage: &Stage, sweeps: u64) {
+        let (film, unit) = (&self.film, self.unit());
+        self.blocks.par_iter_mut().for_each(|block| {
+            block.chains.advance(&stage.mapping, sweeps, unit, &mut stage.recorder(&mut block.splats));
+            film.deposit(&mut block.splats);
+        });
+    }
+
+    fn counts(&self) -> Counts {
+        let mut counts = Counts {
+            mutations: self.bootstrap,
+            rays: self.bootstrap_rays,
+            non_finite: self.bootstrap_faults,
+            ..Counts::default()
+        };
+        let mut accepted = (0.0, 0);
+        for block in &self.blocks {
+            let (rays, faults) = block.chains.rays_and_faults();
+            counts.mutations += block.chains.mutations();
+            counts.rays += rays;
+            counts.non_finite += faults;
+            for (sum, n) in [block.chains.small, block.chains.large] {
+                accepted = (accepted.0 + sum, accepted.1 + n);
+            }
+        }
+        counts.acceptance = vec![mean(accepted.0, accepted.1)];
+        counts
+    }
+
+    fn develop(&self, stage: &Stage) -> Development {
+        let pending = stage.accumulator(1);
+        let mut splats = Splats::new(1);
+        for block in &self.blocks {
+            block.chains.record_pending(self.unit(), &mut stage.recorder(&mut splats));
+        }
+        pending.deposit(&mut splats);
+        let sums = layer_with(stage, &self.film, &pending, 0);
+        let steps: u64 = self.blocks.iter().map(|b| b.chains.mutations()).sum();
+        let scale = if steps > 0 { stage.pixels() as f64 / steps as f64 } else { 0.0 };
+        Development {
+            image: stage.image(|i| [0, 1, 2].map(|channel| sums[i][channel] * scale)),
+            layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
+            normalisation: Some(self.normalisation),
+            warnings: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What the render loop asks of a method.
+
+use crate::{
+    chain::Recorder,
+    film::{Accumulator, Footprint, Image, Plane, Splats},
+    path::unidirectional::Mapping,
+    rng::Rng,
+    tempering::Estimate,
+};
+
+/// What all blocks of a run share.
+pub struct Stage<'s> {
+    /// From primary samples to contributions.
+    pub mapping: Mapping<'s>,
+    /// From film positions to pixels.
+    pub footprint: Footprint,
+    /// Random numbers of the job.
+    pub rng: Rng,
+}
+
+impl Stage<'_> {
+    /// Width and height of the film in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        let film = &self.mapping.scene().film;
+        [film.width, film.height]
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> u64 {
+        let [width, height] = self.size();
+        u64::from(width) * u64::from(height)
+    }
+
+    /// A recorder into `splats`.
+    pub fn recorder<'a>(&'a self, splats: &'a mut Splats) -> Recorder<'a> {
+        let size = self.size().map(|n| n as f32);
+        Recorder { footprint: &self.footprint, size, splats }
+    }
+
+    /// An accumulator for the scene's film.
+    pub fn accumulator(&self, layers: usize) -> Accumulator {
+        let [width, height] = self.size();
+        Accumulator::new(width, height, layers, f64::from(self.mapping.scene().emitters.brightest()))
+    }
+
+    /// An image of f64 colours, each divided and scaled by the caller already.
+    pub fn image(&self, colour: impl Fn(usize) -> [f64; 3]) -> Image {
+        let [width, height] = self.size();
+        let pixels = (0..self.pixels() as usize).map(|i| colour(i).map(|v| v as f32)).collect();
+        Image::new(width, height, pixels)
+    }
+}
+
+/// What a method has to show at some moment.
+pub struct Development {
+    /// The picture.
+    pub image: Image,
+    /// Further layers.
+    pub layers: Vec<(String, Plane)>,
+    /// c, the mean luminance of the picture.
+    pub normalisation: Option<Estimate>,
+    /// What the person should know about the picture, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// What a method counts.
+#[derive(Clone, Debug, Default)]
+pub struct Counts {
+    /// Evaluations of all kinds.
+    pub mutations: u64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Contributions settled.
+    pub non_finite: u64,
+    /// Mean acceptance probability by tempered rung, coldest last.
+    pub acceptance: Vec<f64>,
+    /// Mean swap probability by pair of rungs, hottest first.
+    pub swap: Vec<f64>,
+}
+
+/// A method at work. Sweeps are counted from 0; all state is a function of the job and the sweeps done, never of the
+/// threads or of how the sweeps were sliced.
+pub trait Engine: Send {
+    /// Sweeps to go through in all; `None`: for as long as time allows.
+    fn sweeps_wanted(&self) -> Option<u64>;
+    /// Evaluations that the whole run takes, where it is limited.
+    fn mutations_wanted(&self) -> Option<u64>;
+    /// Goes through `sweeps` more sweeps, in parallel over blocks on the current thread pool.
+    fn advance(&mut self, stage: &Stage, sweeps: u64);
+    /// Counts so far.
+    fn counts(&self) -> Counts;
+    /// The picture so far; changes nothing.
+    fn develop(&self, stage: &Stage) -> Development;
+}
+
+/// Σ rgb and Σ weight of every pixel of a layer, with splats added that are not in the accumulator.
+pub fn layer_with(stage: &Stage, film: &Accumulator, pending: &Accumulator, layer: usize) -> Vec<[f64; 4]> {
+    debug_assert_eq!(stage.pixels() as usize, film.layer(layer).len());
+    let mut sums = film.layer(layer);
+    for (sum, more) in sums.iter_mut().zip(pending.layer(layer)) {
+        sum.iter_mut().zip(more).for_each(|(s, m)| *s += m);
+    }
+    sums
+}
+
+/// A mean that is 0 where there is nothing.
+pub fn mean(sum: f64, n: u64) -> f64 {
+    if n == 0 { 0.0 } else { sum / n as f64 }
+}

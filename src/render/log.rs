@@ -1,0 +1,358 @@
+//! The run log: one JSON object a line, each with its `event`.
+//!
+//! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `run_end`
+//! the same at the end, with the files written. Times are seconds, rates are probabilities. A line is on its way to
+//! the disk once its event is over, so the log of a run that was killed is complete up to then.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::output::Picture;
+use super::status::{Observer, RunStart, Status, Summary};
+use crate::film::file::{FileError, check_writable};
+
+/// Finds out now whether a log can be written to `path`; leaves it as it is.
+pub fn check(path: &Path) -> Result<(), FileError> {
+    match path.metadata() {
+        // A file that exists is overwritten in place, whatever its folder allows.
+        Ok(found) if found.is_file() => {
+            OpenOptions::new().write(true).open(path).map(drop).map_err(|error| FileError::write(path, error))
+        }
+        Ok(found) if !found.is_dir() => Ok(()), // a pipe or device: opening it to try could disturb its reader
+        _ => check_writable(path),
+    }
+}
+
+/// Writes the log.
+pub struct Log {
+    state: Mutex<State>,
+}
+
+struct State {
+    file: Box<dyn Write + Send>,
+    /// When the next snapshot line is due.
+    due: Duration,
+    /// The first failure; nothing is written after it.
+    failed: Option<io::Error>,
+}
+
+/// Snapshot lines are this far apart at least, and their times grow by a quarter each: errors are plotted against
+/// the logarithm of time, and a night's log stays short.
+const SHORTEST_GAP: Duration = Duration::from_secs(1);
+
+impl Log {
+    /// Begins a log, replacing what the file held.
+    pub fn create(path: &Path) -> Result<Log, FileError> {
+        File::create(path).map(Log::new).map_err(|error| FileError::write(path, error))
+    }
+
+    /// A log to anything that can be written to.
+    pub fn new(file: impl Write + Send + 'static) -> Log {
+        let state = State { file: Box::new(file), due: SHORTEST_GAP, failed: None };
+        Log { state: Mutex::new(state) }
+    }
+
+    /// What kept the log from being complete, if anything did.
+    pub fn failure(&self) -> Option<String> {
+        self.state().failed.as_ref().map(ToString::to_string)
+    }
+
+    fn state(&self) -> std::sync::MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn line(&mut self, event: &Event) {
+        if self.failed.is_some() {
+            return;
+        }
+        let written = serde_json::to_vec(event).map_err(io::Error::from).and_then(|mut line| {
+            line.push(b'\n');
+            self.file.write_all(&line)?;
+            self.file.flush()
+        });
+        self.failed = written.err();
+    }
+}
+
+impl Observer for Log {
+    fn started(&self, start: &RunStart) {
+        self.state().line(&Event::RunStart {
+            relt: env!("CARGO_PKG_VERSION"),
+            method: start.settings.method.name(),
+            seed: start.settings.seed,
+            machine: Machine::this(),
+            start,
+        });
+    }
+
+    fn progress(&self, status: &Status) {
+        let mut state = self.state();
+        if status.elapsed >= state.due {
+            state.due = status.elapsed + SHORTEST_GAP.max(status.elapsed / 4);
+            state.line(&Event::Snapshot { now: status.into(), image_written: false });
+        }
+    }
+
+    fn snapshot(&self, status: &Status, _picture: &Picture) {
+        self.state().line(&Event::Snapshot { now: status.into(), image_written: true });
+    }
+
+    fn finished(&self, summary: &Summary) {
+        self.state().line(&Event::RunEnd {
+            now: (&summary.status).into(),
+            interrupted: summary.interrupted,
+            outputs: summary.outputs.iter().map(|path| path.display().to_string()).collect(),
+            warnings: &summary.warnings,
+        });
+    }
+}
+
+/// A line of the log.
+#[derive(Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event<'a> {
+    RunStart {
+        relt: &'static str,
+        method: &'static str,
+        seed: u64,
+        machine: Machine,
+        #[serde(flatten)]
+        start: &'a RunStart,
+    },
+    Snapshot {
+        #[serde(flatten)]
+        now: Now<'a>,
+        /// An image of this moment was made as well.
+        image_written: bool,
+    },
+    RunEnd {
+        #[serde(flatten)]
+        now: Now<'a>,
+        interrupted: bool,
+        outputs: Vec<String>,
+        warnings: &'a [String],
+    },
+}
+
+/// What a snapshot and the end have in common.
+#[derive(Serialize)]
+struct Now<'a> {
+    /// Wall time since rendering began.
+    seconds: f64,
+    /// Processor time of the whole process, all threads; null where the system does not tell.
+    cpu_seconds: Option<f64>,
+    mutations: u64,
+    mutations_per_second: f64,
+    rays: u64,
+    /// Of each tempered rung, coldest last.
+    acceptance: &'a [f64],
+    /// Of each pair of neighbours, hottest first.
+    swap: &'a [f64],
+    non_finite: u64,
+    normalisation: Option<f64>,
+    normalisation_error: Option<f64>,
+}
+
+impl<'a> From<&'a Status> for Now<'a> {
+    fn from(status: &'a Status) -> Now<'a> {
+        Now {
+            seconds: status.elapsed.as_secs_f64(),
+            cpu_seconds: cpu_seconds(),
+            mutations: status.mutations,
+            mutations_per_second: status.mutations_per_second(),
+            rays: status.rays,
+            acceptance: &status.acceptance,
+            swap: &status.swap,
+            non_finite: status.non_finite,
+            normalisation: status.normalisation.map(|(value, _)| value),
+            normalisation_error: status.normalisation.map(|(_, error)| error),
+        }
+    }
+}
+
+/// What a run's speed depends on.
+#[derive(Serialize)]
+struct Machine {
+    /// Processor model; null where the system does not tell.
+    cpu: Option<String>,
+    /// Threads that run at once.
+    cores: usize,
+    /// Operating system.
+    os: String,
+    /// Instruction set family.
+    architecture: &'static str,
+}
+
+impl Machine {
+    fn this() -> Machine {
+        let of_file = |path: &str, key: &str, separator: char| {
+            let text = std::fs::read_to_string(path).ok()?;
+            let (_, value) =
+                text.lines().find_map(|line| line.split_once(separator).filter(|(k, _)| k.trim() == key))?;
+            Some(value.trim().trim_matches('"').to_owned())
+        };
+        Machine {
+            cpu: of_file("/proc/cpuinfo", "model name", ':'),
+            cores: available_parallelism().map_or(1, usize::from),
+            os: of_file("/etc/os-release", "PRETTY_NAME", '=').unwrap_or_else(|| std::env::consts::OS.to_owned()),
+            architecture: std::env::consts::ARCH,
+        }
+    }
+}
+
+/// User and system time of this process from Linux's `/proc/self/stat`.
+fn cpu_seconds() -> Option<f64> {
+    /// The kernel counts in this unit on every architecture that Linux and Embree share.
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The second field is the program's name in parentheses and may itself hold spaces and parentheses; user and
+    // system time are fields 14 and 15, that is, 12th and 13th behind it (proc_pid_stat(5)).
+    let mut behind_name = stat[stat.rfind(')')? + 1..].split_whitespace().skip(11);
+    let mut ticks = || behind_name.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / TICKS_PER_SECOND)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use serde_json::Value;
+
+    use super::*;
+    use crate::film::Image;
+    use crate::render::settings::Settings;
+
+    /// A file in memory that can be looked into.
+    #[derive(Clone, Default)]
+    struct Shared(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn lines(file: &Shared) -> Vec<Value> {
+        let text = String::from_utf8(file.0.lock().unwrap().clone()).unwrap();
+        assert!(text.is_empty() || text.ends_with('\n'));
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    fn status(seconds: u64) -> Status {
+        Status {
+            elapsed: Duration::from_secs(seconds),
+            mutations: 1000 * seconds,
+            rays: 5000 * seconds,
+            acceptance: vec![0.5, 0.25],
+            swap: vec![0.75, f64::NAN],
+            normalisation: Some((0.5, 0.125)),
+            ..Status::default()
+        }
+    }
+
+    #[test]
+    fn a_run_reads_back() {
+        let file = Shared::default();
+        let log = Log::new(file.clone());
+        let settings = Settings { seed: 5, time: Some(Duration::from_secs(90)), ..Settings::default() };
+        log.started(&RunStart {
+            scene: "scenes/tür/scene.xml".into(),
+            settings,
+            threads: 2,
+            embree: "4.3.0".into(),
+            ..RunStart::default()
+        });
+        log.progress(&status(2));
+        let picture = Picture { image: Image::constant(1, 1, [0.0; 3]), layers: vec![], metadata: vec![] };
+        log.snapshot(&status(3), &picture);
+        log.finished(&Summary {
+            status: status(4),
+            outputs: vec!["a.exr".into()],
+            interrupted: true,
+            warnings: vec!["dark".into()],
+        });
+
+        let [start, snapshot, with_image, end] = &lines(&file)[..] else { panic!("four events, four lines") };
+        assert_eq!(start["event"], "run_start");
+        assert_eq!(start["relt"], env!("CARGO_PKG_VERSION"));
+        assert_eq!(start["scene"], "scenes/tür/scene.xml");
+        assert_eq!(start["method"], "re");
+        assert_eq!(start["seed"], 5);
+        assert_eq!(start["embree"], "4.3.0");
+        assert_eq!(start["settings"]["time"], 90.0);
+        assert_eq!(start["settings"]["ladder"]["replicas"], 4);
+        assert_eq!(start["settings"]["packet"], "auto");
+        assert!(start["machine"]["cores"].as_u64() >= Some(1));
+        assert_eq!(snapshot["event"], "snapshot");
+        assert_eq!(snapshot["seconds"], 2.0);
+        assert_eq!(snapshot["mutations"], 2000);
+        assert_eq!(snapshot["mutations_per_second"], 1000.0);
+        assert_eq!(snapshot["acceptance"], serde_json::json!([0.5, 0.25]));
+        assert_eq!(snapshot["swap"], serde_json::json!([0.75, null]), "a rate that is not known yet");
+        assert_eq!(snapshot["normalisation_error"], 0.125);
+        assert_eq!((&snapshot["image_written"], &with_image["image_written"]), (&false.into(), &true.into()));
+        assert_eq!(end["event"], "run_end");
+        assert_eq!(end["interrupted"], true);
+        assert_eq!(end["outputs"], serde_json::json!(["a.exr"]));
+        assert_eq!(end["warnings"], serde_json::json!(["dark"]));
+        if cfg!(target_os = "linux") {
+            assert!(end["cpu_seconds"].as_f64() >= Some(0.0));
+        }
+    }
+
+    #[test]
+    fn snapshots_thin_out_with_time() {
+        let file = Shared::default();
+        let log = Log::new(file.clone());
+        for second in 0..10_000 {
+            log.progress(&status(second));
+        }
+        let times: Vec<f64> = lines(&file).iter().map(|line| line["seconds"].as_f64().unwrap()).collect();
+        assert_eq!(times[..6], [1.0, 2.0, 3.0, 4.0, 5.0, 7.0]);
+        assert!((30..60).contains(&times.len()), "{} lines", times.len());
+    }
+
+    #[test]
+    fn a_full_disk_is_remembered_and_stops_nothing() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let log = Log::new(Full);
+        assert_eq!(log.failure(), None);
+        log.started(&RunStart::default());
+        log.progress(&status(1));
+        assert!(log.failure().is_some());
+    }
+
+    #[test]
+    fn checking_changes_no_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.jsonl");
+        check(&path).unwrap();
+        assert!(!path.exists());
+        std::fs::write(&path, "old\n").unwrap();
+        check(&path).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"old\n");
+        assert!(check(folder.path()).is_err());
+        assert!(check(&folder.path().join("nowhere/run.jsonl")).unwrap_err().to_string().contains("run.jsonl"));
+    }
+}

@@ -1,0 +1,217 @@
+//! The render loop: slices of sweeps until the budget is spent.
+
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
+
+use super::{
+    baseline::TwoPassMlt,
+    calibration,
+    engine::{Engine, Stage},
+    output::{Picture, metadata},
+    path_tracer::PathTracer,
+    replica_exchange::{self, ReplicaExchange},
+    settings::{Method, PacketChoice, Settings},
+    status::{Observer, Packets, RunStart, Status},
+};
+use crate::{
+    film::Footprint,
+    path::unidirectional::{Mapping, Widths},
+    rng::Rng,
+    scene::Scene,
+};
+
+/// A scene and what to do with it.
+pub struct Job<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What it is called in logs.
+    pub scene_name: String,
+    /// How to render; [`Settings::validate`] has nothing to say about them.
+    pub settings: Settings,
+    /// Set from outside to end the run early.
+    pub stop: &'a AtomicBool,
+}
+
+/// What a run came to.
+pub struct Outcome {
+    /// The picture with its layers and history.
+    pub picture: Picture,
+    /// Where the run stood at its end.
+    pub status: Status,
+    /// It was stopped before its budget was spent.
+    pub interrupted: bool,
+    /// What the person should know, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Why a run could not take place.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The operating system gave no threads.
+    #[error("cannot start {threads} threads: {reason}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+/// How long a slice of sweeps should take: often enough for progress, snapshots and Ctrl-C, and long beside the
+/// moment at its end when threads wait for the last of them.
+const SLICE: Duration = Duration::from_millis(200);
+
+/// Renders a job and tells `observer` how it goes.
+pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
+    let begin = Instant::now();
+    let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+    let pool = thread_pool(threads, job.settings.pin)?;
+    let widths = match job.settings.packet {
+        PacketChoice::Auto => calibration::calibrate(job.scene),
+        PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
+    };
+    let film = job.scene.film;
+    let stage = Stage {
+        mapping: Mapping::new(job.scene, widths),
+        footprint: Footprint::new(film.filter, film.width, film.height),
+        rng: Rng::new(job.settings.seed),
+    };
+    let start = run_start(job, threads, widths);
+    observer.started(&start);
+    let (mut engine, interrupted) = pool.install(|| {
+        let mutations = job.settings.mutations_per_pixel.map(|mpp| (mpp * stage.pixels() as f64).ceil() as u64);
+        let mut engine = engine(&stage, &job.settings, mutations);
+        let interrupted = work(job, &stage, engine.as_mut(), &start, observer, begin);
+        (engine, interrupted)
+    });
+    Ok(conclude(job, &stage, engine.as_mut(), &start, interrupted, begin))
+}
+
+fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
+    let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("relt {i}"));
+    if pin && let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
+        builder = builder.start_handler(move |i| {
+            core_affinity::set_for_current(cores[i % cores.len()]);
+        });
+    }
+    builder.build().map_err(|e| RenderError::Threads { threads, reason: e.to_string() })
+}
+
+fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
+    match settings.method {
+        Method::Path => Box::new(PathTracer::new(stage, mutations)),
+        Method::Mlt => Box::new(TwoPassMlt::new(stage, mutations)),
+        Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
+    }
+}
+
+/// Slice after slice until a budget is spent or the run is stopped; true if stopped.
+fn work(
+    job: &Job,
+    stage: &Stage,
+    engine: &mut dyn Engine,
+    start: &RunStart,
+    observer: &dyn Observer,
+    begin: Instant,
+) -> bool {
+    let mut done = 0;
+    let mut slice = 1;
+    loop {
+        let left = engine.sweeps_wanted().map_or(u64::MAX, |wanted| wanted - done);
+        let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(begin.elapsed()));
+        if left == 0 || time_left.is_zero() {
+            return false;
+        }
+        if job.stop.load(Ordering::Relaxed) {
+            return true;
+        }
+        let slice_begin = Instant::now();
+        let sweeps = slice.min(left);
+        engine.advance(stage, sweeps);
+        done += sweeps;
+        // the next slice fills its time, or what is left of the run's
+        let a_sweep = slice_begin.elapsed().as_secs_f64() / sweeps as f64;
+        let next = SLICE.min(job.settings.time.map_or(SLICE, |time| time.saturating_sub(begin.elapsed())));
+        slice = ((next.as_secs_f64() / a_sweep) as u64).clamp(1, 2 * slice);
+
+        let status = status(job, engine, begin);
+        observer.progress(&status);
+        if observer.wants_picture(&status) {
+            let development = engine.develop(stage);
+            let status =
+                Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
+            let metadata = metadata(start, &status);
+            let picture = Picture { image: development.image, layers: development.layers, metadata };
+            observer.snapshot(&status, &picture);
+        }
+    }
+}
+
+fn status(job: &Job, engine: &dyn Engine, begin: Instant) -> Status {
+    let counts = engine.counts();
+    Status {
+        elapsed: begin.elapsed(),
+        mutations: counts.mutations,
+        target_mutations: engine.mutations_wanted(),
+        time_budget: job.settings.time,
+        rays: counts.rays,
+        acceptance: counts.acceptance,
+        swap: counts.swap,
+        non_finite: counts.non_finite,
+        normalisation: None,
+    }
+}
+
+fn conclude(
+    job: &Job,
+    stage: &Stage,
+    engine: &mut dyn Engine,
+    start: &RunStart,
+    interrupted: bool,
+    begin: Instant,
+) -> Outcome {
+    let status = status(job, engine, begin);
+    let development = engine.develop(stage);
+    let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
+    let mut warnings = development.warnings;
+    if development.image.pixels.iter().flatten().all(|v| *v == 0.0) {
+        warnings.push(format!(
+            "the image is black: none of {} paths met light; is a light in reach of what the camera sees?",
+            status.mutations
+        ));
+    }
+    if status.non_finite > 0 {
+        warnings.push(format!(
+            "{} of {} paths had a contribution that was not finite; they count as dark",
+            status.non_finite, status.mutations
+        ));
+    }
+    let picture = Picture { image: development.image, layers: development.layers, metadata: metadata(start, &status) };
+    Outcome { picture, status, interrupted, warnings }
+}
+
+fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
+    let device = job.scene.tracer.device();
+    let (major, minor, patch) = device.version();
+    RunStart {
+        scene: job.scene_name.clone(),
+        width: job.scene.film.width,
+        height: job.scene.film.height,
+        settings: job.settings.clone(),
+        threads,
+        betas: match job.settings.method {
+            Method::ReplicaExchange => replica_exchange::ladder(&job.settings).betas().to_vec(),
+            Method::Path | Method::Mlt => Vec::new(),
+        },
+        features: job.scene.features.in_words(),
+        embree: format!("{major}.{minor}.{patch}"),
+        embree_library: device.library_path().display().to_string(),
+        packets: Packets {
+            camera: widths.camera.lanes(),
+            bounce: widths.bounce.lanes(),
+            shadow: widths.shadow.lanes(),
+        },
+    }
+}

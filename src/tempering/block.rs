@@ -1,0 +1,313 @@
+//! Ladders side by side: the batch that one thread works on at a time.
+
+use std::sync::Arc;
+
+use super::{Histogram, Ladder, Weights, ladder::swap_acceptance};
+use crate::{
+    chain::{Evaluator, Recorder, Target, Walkers},
+    path::Contribution,
+    rng::{Counter, Purpose, Rng, open_unit_f64},
+    sample::{Move, StepLaw},
+};
+
+/// Layers of the film that replica exchange fills.
+pub mod layer {
+    /// Plain mean of f over uniform points: the uniform replica's own estimate.
+    pub const UNIFORM: usize = 0;
+    /// What uniform points add to the image.
+    pub const HOT: usize = 1;
+    /// What tempered states add to the image, in the unit of [`Weights`](super::Weights).
+    pub const TEMPERED: usize = 2;
+}
+
+/// Number of [`layer`]s.
+pub const LAYERS: usize = 3;
+
+/// Counts of one tempered rung or of the swaps to it, mergeable by addition.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RungCounts {
+    /// Σ of acceptance probabilities of small steps.
+    pub accepted: f64,
+    /// Small steps proposed.
+    pub proposed: u64,
+    /// Σ of acceptance probabilities of swaps with the next hotter rung.
+    pub swapped: f64,
+    /// Such swaps offered.
+    pub offered: u64,
+}
+
+impl std::ops::AddAssign for RungCounts {
+    fn add_assign(&mut self, other: RungCounts) {
+        self.accepted += other.accepted;
+        self.proposed += other.proposed;
+        self.swapped += other.swapped;
+        self.offered += other.offered;
+    }
+}
+
+/// Whole ladders whose replicas and uniform points are evaluated together, one lane each.
+///
+/// A sweep moves every replica once, draws `uniform_draws` fresh points for every ladder, offers each of those to
+/// its ladder's lowest chain, and swaps neighbours among the tempered rungs by even–odd parity (Okabe et al. 2001;
+/// Syed et al. 2021). All random words are named by (ladder, replica, sweep), never by the thread.
+pub struct Block<W> {
+    ladder: Arc<Ladder>,
+    ladders: usize,
+    uniform_draws: usize,
+    /// Lane of replica r of ladder l: l · (K − 1) + r.
+    walkers: Walkers,
+    /// Rung of each replica, 1 … K − 1.
+    rung: Vec<u16>,
+    /// Replica on each tempered rung of each ladder; the inverse of `rung`.
+    replica_on: Vec<u16>,
+    /// The replicas' lanes, then `uniform_draws` lanes for each ladder.
+    evaluator: Evaluator<W>,
+    sweeps: u64,
+    /// By rung; entry 0 is unused.
+    counts: Vec<RungCounts>,
+    uniform: Histogram,
+    uniform_sum: f64,
+    tempered: Histogram,
+    /// Weight of recorded states by rung.
+    weights: Vec<f64>,
+    /// Weight of the states that went to the film, by rung.
+    deposited: Vec<f64>,
+}
+
+/// What a block does with the states it goes through.
+#[derive(Clone, Copy)]
+pub enum Phase<'a> {
+    /// Chains are finding their feet: only the uniform replica's own estimate is kept.
+    WarmUp,
+    /// States go to the image with these weights and into the statistics.
+    Round(&'a Weights),
+}
+
+impl<W: Default> Block<W> {
+    /// Ladders `first_ladder`, `first_ladder + 1`, …, all without states, with `uniform_draws` ≥ 1 a sweep.
+    pub fn new(ladder: Arc<Ladder>, rng: Rng, first_ladder: u32, ladders: usize, uniform_draws: usize) -> Block<W> {
+        let chains = ladder.rungs() - 1;
+        let counter = |l: usize, replica: usize| Counter {
+            ladder: first_ladder + l as u32,
+            replica: replica as u16,
+            step: 0,
+            purpose: Purpose::Primary,
+        };
+        let replicas = (0..ladders * chains).map(|lane| counter(lane / chains, lane % chains));
+        let uniform = (0..ladders * uniform_draws).map(|i| counter(i / uniform_draws, chains + i % uniform_draws));
+        let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, replicas.chain(uniform).collect());
+        evaluator.moves.fill(Move::Fresh);
+        Block {
+            walkers: Walkers::new(ladders * chains),
+            rung: (0..ladders * chains).map(|lane| (lane % chains) as u16 + 1).collect(),
+            replica_on: (0..ladders * chains).map(|lane| (lane % chains) as u16).collect(),
+            counts: vec![RungCounts::default(); ladder.rungs()],
+            weights: vec![0.0; ladder.rungs()],
+            deposited: vec![0.0; ladder.rungs()],
+            uniform: Histogram::default(),
+            uniform_sum: 0.0,
+            tempered: Histogram::default(),
+            ladder,
+            ladders,
+            uniform_draws,
+            evaluator,
+            sweeps: 0,
+        }
+    }
+
+    /// Goes through `sweeps` sweeps.
+    pub fn advance<T: Target<Workspace = W>>(
+        &mut self,
+        target: &T,
+        sweeps: u64,
+        phase: Phase,
+        recorder: &mut Recorder,
+    ) {
+        for _ in 0..sweeps {
+            self.propose(target);
+            self.explore(phase, recorder);
+            self.inject(phase, recorder);
+            self.swap(phase, recorder);
+            self.sweeps += 1;
+        }
+    }
+
+    /// Evaluates a proposal for every replica and the fresh uniform points, all in one batch.
+    fn propose<T: Target<Workspace = W>>(&mut self, target: &T) {
+        for counter in &mut self.evaluator.counters {
+            counter.step = self.sweeps;
+        }
+        for lane in 0..self.rung.len() {
+            self.evaluator.moves[lane] = self.walkers.exploring(lane);
+        }
+        self.evaluator.evaluate(target, &self.walkers.points);
+    }
+
+    /// One Metropolis step of every replica at its own inverse temperature.
+    fn explore(&mut self, phase: Phase, recorder: &mut Recorder) {
+        let rng = self.evaluator.rng();
+        for lane in 0..self.rung.len() {
+            let k = usize::from(self.rung[lane]);
+            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
+            let u = open_unit_f64(rng.words(counter, 0)[0]);
+            let proposed = self.evaluator.out.lanes[lane];
+            let mut record = record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+            let small = self.evaluator.moves[lane] == Move::Small;
+            let beta = self.ladder.betas()[k];
+            let alpha = self.walkers.step(lane, beta, (&self.evaluator.points, lane), &proposed, u, &mut record);
+            if small {
+                self.counts[k].accepted += alpha;
+                self.counts[k].proposed += 1;
+            }
+        }
+    }
+
+    /// Records the uniform points and offers each to the lowest chain of its ladder, a swap that costs nothing.
+    fn inject(&mut self, phase: Phase, recorder: &mut Recorder) {
+        let rng = self.evaluator.rng();
+        let chains = self.ladder.rungs() - 1;
+        let coldest_of_pair = self.ladder.betas()[1];
+        for i in 0..self.ladders * self.uniform_draws {
+            let from = self.rung.len() + i;
+            let point = self.evaluator.out.lanes[from];
+            self.uniform.add(point.ln_g, 1.0);
+            if point.is_dark() {
+                self.counts[1].offered += 1;
+                continue;
+            }
+            self.uniform_sum += point.g();
+            recorder.splat(layer::UNIFORM, &point, 1.0, 1.0);
+            if let Phase::Round(weights) = phase {
+                let share = weights.uniform(point.ln_g);
+                if share > 0.0 {
+                    recorder.splat(layer::HOT, &point, share, 1.0);
+                }
+            }
+            let ladder = i / self.uniform_draws;
+            let lane = ladder * chains + usize::from(self.replica_on[ladder * chains]);
+            let alpha = swap_acceptance(0.0, point.ln_g, coldest_of_pair, self.walkers.states[lane].ln_g);
+            self.counts[1].swapped += alpha;
+            self.counts[1].offered += 1;
+            let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[from] };
+            if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
+                let mut record = record(phase, 1, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+                self.walkers.replace(lane, (&self.evaluator.points, from), &point, &mut record);
+            }
+        }
+    }
+
+    /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones.
+    fn swap(&mut self, phase: Phase, recorder: &mut Recorder) {
+        let rng = self.evaluator.rng();
+        let rungs = self.ladder.rungs();
+        let chains = rungs - 1;
+        for ladder in 0..self.ladders {
+            let base = ladder * chains;
+            for hotter in (1 + (self.sweeps % 2) as usize..rungs - 1).step_by(2) {
+                let colder = hotter + 1;
+                let lanes = [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
+                let betas = self.ladder.betas();
+                let [h, c] = lanes.map(|lane| self.walkers.states[lane].ln_g);
+                let alpha = swap_acceptance(betas[hotter], h, betas[colder], c);
+                self.counts[colder].swapped += alpha;
+                self.counts[colder].offered += 1;
+                let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[base] };
+                if open_unit_f64(rng.words(counter, colder as u16)[0]) < alpha {
+                    for (lane, k) in lanes.into_iter().zip([hotter, colder]) {
+                        let mut record =
+                            record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+                        self.walkers.flush(lane, &mut record);
+                    }
+                    self.rung.swap(lanes[0], lanes[1]);
+                    self.replica_on.swap(base + hotter - 1, base + colder - 1);
+                }
+            }
+        }
+    }
+
+    /// Records what all current states have gathered; must happen before a phase ends.
+    pub fn flush(&mut self, phase: Phase, recorder: &mut Recorder) {
+        for lane in 0..self.rung.len() {
+            let k = usize::from(self.rung[lane]);
+            let mut record = record(phase, k, &mut self.tempered, &mut self.weights, &mut self.deposited, recorder);
+            self.walkers.flush(lane, &mut record);
+        }
+    }
+
+    /// The block's statistics with those of states not yet recorded; the pending splats go to `recorder`.
+    pub fn snapshot(&self, phase: Phase, recorder: &mut Recorder) -> Statistics {
+        let mut tempered = self.tempered.clone();
+        let (mut weights, mut deposited) = (self.weights.clone(), self.deposited.clone());
+        for (lane, state) in
+            self.walkers.states.iter().enumerate().filter(|(lane, _)| self.walkers.pending[*lane] > 0.0)
+        {
+            let k = usize::from(self.rung[lane]);
+            let mut record = record(phase, k, &mut tempered, &mut weights, &mut deposited, recorder);
+            record(state, self.walkers.pending[lane]);
+        }
+        Statistics {
+            uniform: self.uniform.clone(),
+            uniform_sum: (self.uniform_sum, (self.sweeps * (self.ladders * self.uniform_draws) as u64) as f64),
+            tempered,
+            weights,
+            deposited,
+        }
+    }
+
+    /// Acceptances and swaps by rung; entry 0 is empty.
+    pub fn counts(&self) -> &[RungCounts] {
+        &self.counts
+    }
+
+    /// Forgets acceptances and swaps, as after the warm-up.
+    pub fn reset_counts(&mut self) {
+        self.counts.fill(RungCounts::default());
+    }
+
+    /// Evaluations so far: steps of replicas and uniform points.
+    pub fn mutations(&self) -> u64 {
+        self.sweeps * self.evaluator.moves.len() as u64
+    }
+
+    /// Rays traced and contributions settled so far.
+    pub fn rays_and_faults(&self) -> (u64, u64) {
+        (self.evaluator.out.rays, self.evaluator.out.non_finite)
+    }
+}
+
+/// What a block has seen; input of the [`Normalisers`](super::Normalisers).
+#[derive(Clone, Debug)]
+pub struct Statistics {
+    /// ln g of uniform points.
+    pub uniform: Histogram,
+    /// Σ g over uniform points, and their number.
+    pub uniform_sum: (f64, f64),
+    /// ln g of states on tempered rungs, weighted.
+    pub tempered: Histogram,
+    /// Weight of states by rung.
+    pub weights: Vec<f64>,
+    /// Weight of states that went to the film, by rung.
+    pub deposited: Vec<f64>,
+}
+
+/// A recorder of states on rung `k`: into the statistics and, with the phase's weights, onto the film.
+#[inline(always)]
+fn record<'r>(
+    phase: Phase<'r>,
+    k: usize,
+    tempered: &'r mut Histogram,
+    weights: &'r mut [f64],
+    deposited: &'r mut [f64],
+    recorder: &'r mut Recorder<'_>,
+) -> impl FnMut(&Contribution, f64) {
+    move |state, weight| {
+        let Phase::Round(combination) = phase else { return };
+        tempered.add(state.ln_g, weight);
+        weights[k] += weight;
+        let value = combination.tempered(k, state.ln_g);
+        if value > 0.0 {
+            deposited[k] += weight;
+            recorder.splat(layer::TEMPERED, state, value * weight, weight);
+        }
+    }
+}

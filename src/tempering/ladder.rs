@@ -1,0 +1,82 @@
+//! The ladder and the acceptance of swaps on it.
+
+/// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1, K ≥ 2.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ladder {
+    betas: Vec<f64>,
+}
+
+impl Ladder {
+    /// Most rungs of a ladder.
+    pub const LONGEST: usize = 1024;
+
+    /// A ladder of given inverse temperatures.
+    ///
+    /// # Panics
+    /// If they do not rise strictly from 0 to 1 or are more than [`LONGEST`](Self::LONGEST); what people give is
+    /// checked, with better words, by [`Settings`](crate::render::Settings).
+    pub fn new(betas: Vec<f64>) -> Ladder {
+        assert!((2..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
+        assert!(betas[0] == 0.0 && betas[betas.len() - 1] == 1.0, "from {} to {}", betas[0], betas[betas.len() - 1]);
+        assert!(betas.windows(2).all(|pair| pair[0] < pair[1]), "inverse temperatures must rise: {betas:?}");
+        Ladder { betas }
+    }
+
+    /// `rungs` equal steps from 0 to 1; 2 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
+    pub fn even(rungs: usize) -> Ladder {
+        Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1) as f64).collect())
+    }
+
+    /// The inverse temperatures.
+    pub fn betas(&self) -> &[f64] {
+        &self.betas
+    }
+
+    /// Number of rungs K, the uniform one included.
+    pub fn rungs(&self) -> usize {
+        self.betas.len()
+    }
+}
+
+/// Probability of swapping the states of two rungs, `hotter` with the smaller inverse temperature, given ln g of the
+/// state on each.
+///
+/// α = min(1, exp((β_c − β_h)(ln g_h − ln g_c))). In this order −∞ + ∞ never occurs: a colder rung without a state
+/// takes any; a hotter state that is dark cannot climb. Source: Geyer 1991; design, ALGORITHM section 4.
+#[inline(always)]
+pub fn swap_acceptance(beta_hotter: f64, ln_g_hotter: f64, beta_colder: f64, ln_g_colder: f64) -> f64 {
+    debug_assert!(beta_hotter < beta_colder);
+    if ln_g_colder == f64::NEG_INFINITY {
+        return if ln_g_hotter == f64::NEG_INFINITY { 0.0 } else { 1.0 };
+    }
+    if ln_g_hotter == f64::NEG_INFINITY {
+        return 0.0;
+    }
+    libm::exp(((beta_colder - beta_hotter) * (ln_g_hotter - ln_g_colder)).min(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_ladder_rises_from_the_uniform_distribution_to_the_target() {
+        assert_eq!(Ladder::even(2).betas(), [0.0, 1.0]);
+        assert_eq!(Ladder::even(3).betas(), [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn a_swap_is_accepted_by_the_ratio_of_the_joint_densities() {
+        // (g_h/g_c)^(β_c − β_h)
+        assert!((swap_acceptance(0.25, 1.0, 0.75, 3.0) - (-1.0f64).exp()).abs() < 1e-15);
+        assert_eq!(swap_acceptance(0.25, 3.0, 0.75, 1.0), 1.0);
+    }
+
+    #[test]
+    fn a_dark_state_cannot_climb_the_ladder() {
+        let dark = f64::NEG_INFINITY;
+        assert_eq!(swap_acceptance(0.0, dark, 1.0, -500.0), 0.0);
+        assert_eq!(swap_acceptance(0.0, dark, 1.0, dark), 0.0);
+        assert_eq!(swap_acceptance(0.0, -500.0, 1.0, dark), 1.0);
+    }
+}
