@@ -471,3 +471,45 @@ fn a_fault_without_a_place_is_shown_without_one() {
     miette::GraphicalReportHandler::new_themed(theme).render_report(&mut shown, &error).unwrap();
     assert!(shown.contains("none.xml: cannot be read") && !shown.contains("╭"), "{shown}");
 }
+
+#[test]
+fn no_slip_of_the_finger_is_a_panic() {
+    let text = around(
+        "<default name='fov' value='30'/><bsdf type='twosided' id='ä'><bsdf type='diffuse'><rgb name='reflectance' \
+        value='.1, .2, .3'/></bsdf></bsdf>\n<shape type='obj'><string name='filename' value='good.obj'/>\
+        <ref id='ä'/></shape><shape type='sphere'><float name='radius' value='$fov'/><point name='center' x='1' y='2' \
+        z='3'/><transform name='to_world'><lookat origin='0,0,0' target='1 2 3' up='0 1 0'/><rotate x='1' angle='9'/>\
+        <scale value='2'/><matrix value='1 0 0 0 1 0 0 0 1'/></transform><emitter type='area'/></shape>",
+    );
+    let folder = Folder::new(FILES);
+    folder.load(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut faulty = 0;
+    for (at, letter) in text.char_indices() {
+        let (before, after) = (&text[..at], &text[at + letter.len_utf8()..]);
+        for slip in ["", "9", "<", "'", " ", "$", "ß", "-"] {
+            if let Err(error) = folder.load(&format!("{before}{slip}{after}"), &[]) {
+                assert!(!error.to_string().is_empty());
+                faulty += 1;
+            }
+        }
+    }
+    assert!(faulty > 1000, "{faulty} slips of {} were found", 8 * text.chars().count());
+}
+
+#[test]
+fn no_slip_in_a_mesh_is_a_panic() {
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 1\nvn 0 0 1\no a\nf 1/1/1 2/1/1 3/1/1\nf -1//-1 -2//-1 -3//-1\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for (kind, content) in [("obj", obj), ("ply", ply)] {
+        let folder = Folder::new(&[]);
+        let text = around(&format!("<shape type='{kind}'><string name='filename' value='a.{kind}'/></shape>"));
+        for at in 0..content.len() {
+            for slip in ["", "9", "-", "x", "\n", "/", "\u{0}"] {
+                let slipped = format!("{}{slip}{}", &content[..at], &content[at + 1..]);
+                std::fs::write(folder.path(&format!("a.{kind}")), slipped).expect("a file in the folder");
+                let _ = folder.load(&text, &[]);
+            }
+        }
+    }
+}
