@@ -36,17 +36,29 @@ struct Contents {
 
 /// Collects faults while a file is read.
 #[derive(Debug, Default)]
-pub(super) struct Faults(RefCell<Vec<(Option<Span>, String)>>);
+pub(super) struct Faults {
+    found: RefCell<Vec<(Option<Span>, String)>>,
+    /// Places whose value is not known, so that what else is wrong there only follows from that.
+    unknown: RefCell<Vec<Span>>,
+}
 
 impl Faults {
     /// A fault at a place of the file.
     pub fn at(&self, span: &Span, message: impl Into<String>) {
-        self.0.borrow_mut().push((Some(span.clone()), message.into()));
+        if !self.unknown.borrow().contains(span) {
+            self.found.borrow_mut().push((Some(span.clone()), message.into()));
+        }
+    }
+
+    /// A fault that leaves a place without a value.
+    pub fn without_value(&self, span: &Span, message: impl Into<String>) {
+        self.at(span, message);
+        self.unknown.borrow_mut().push(span.clone());
     }
 
     /// A fault of the file as a whole.
     pub fn general(&self, message: impl Into<String>) {
-        self.0.borrow_mut().push((None, message.into()));
+        self.found.borrow_mut().push((None, message.into()));
     }
 
     /// A name that is not among those known, as in `unknown bsdf "glas"; known: diffuse`.
@@ -56,7 +68,7 @@ impl Faults {
 
     /// `Ok` with the value that was read if nothing was wrong.
     pub fn settle<T>(self, path: &Path, text: String, value: Option<T>) -> Result<T, LoadError> {
-        let mut found = self.0.into_inner();
+        let mut found = self.found.into_inner();
         if let (Some(value), true) = (value, found.is_empty()) {
             return Ok(value);
         }

@@ -1,7 +1,7 @@
 //! Files to scene descriptions: one folder or file a format.
 //!
 //! A reader goes on after a fault, so that one [`LoadError`] tells all that is wrong with a file. To add a format:
-//! a new module and a line in [`FORMATS`].
+//! a new module and a line in `FORMATS`.
 
 mod faults;
 mod mitsuba;

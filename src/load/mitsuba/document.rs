@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::load::faults::{Faults, Span, list};
+use crate::load::faults::{Faults, Span, did_you_mean, list};
 
 /// An element, its `$names` replaced and its attributes known to be those that its tag has.
 #[derive(Debug)]
@@ -277,6 +277,7 @@ impl<'a> Names<'a> {
 
     /// The text with every `$name` in it replaced by its value.
     fn replaced(&mut self, text: &str, span: &Span, faults: &Faults) -> String {
+        let mut missing = Vec::new();
         let mut parts = text.split('$');
         let mut replaced = parts.next().unwrap_or_default().to_string();
         for part in parts {
@@ -284,15 +285,16 @@ impl<'a> Names<'a> {
             let (name, rest) = part.split_at(end);
             match self.values.get(name) {
                 Some(value) => replaced.push_str(value),
-                None => {
-                    let known: Vec<_> = self.values.keys().map(String::as_str).collect();
-                    let known = list(&known);
-                    faults
-                        .at(span, format!("${name} has no value (no <default> before this, no -D {name}=…); {known}"));
-                }
+                None => missing.push(name),
             }
             self.used.insert(name.into());
             replaced.push_str(rest);
+        }
+        if let Some(name) = missing.first() {
+            let known: Vec<_> = self.values.keys().map(String::as_str).collect();
+            let (near, known) = (did_you_mean(name, &known), list(&known));
+            let message = format!("${name} has no value: no <default> before this, no -D {name}=…{near}; {known}");
+            faults.without_value(span, message);
         }
         replaced
     }

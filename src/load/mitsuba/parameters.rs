@@ -28,10 +28,15 @@ impl<'a> ElementParameters<'a> {
         ElementParameters { element, faults, asked: BTreeSet::new(), nested: BTreeSet::new() }
     }
 
-    /// The nested objects of some tags (`ref` for references), in order.
+    /// The nested objects of some tags (`ref` for references), in order, but for those in the place of parameters
+    /// that have been asked for.
     pub fn nested(&mut self, tags: &'static [&'static str]) -> Vec<&'a Element> {
         self.nested.extend(tags);
-        self.element.children.iter().filter(|child| tags.contains(&child.tag)).collect()
+        self.element
+            .children
+            .iter()
+            .filter(|child| tags.contains(&child.tag) && !self.asked.contains(child.value("name")))
+            .collect()
     }
 
     /// The nested object of a tag; a second one is a fault.

@@ -99,6 +99,7 @@ fn pending<'a>(
     faults: &'a Faults,
 ) -> Option<Pending> {
     let mut p = ElementParameters::new(element, faults);
+    let build = SHAPES.find(element, faults).map(|read| read(&mut p, folder));
     let surface = p.nested(&["bsdf", "ref"]);
     for surplus in surface.iter().skip(1) {
         faults.at(&surplus.span, "the shape has more than one <bsdf>");
@@ -110,11 +111,9 @@ fn pending<'a>(
         None if emitter.is_some() => Some(bsdfs.bare_sides(Bare::Black)),
         None => Some(bsdfs.bare_sides(Bare::Grey)),
     };
-    let build = SHAPES.find(element, faults).and_then(|read| {
-        let build = read(&mut p, folder);
-        p.finish();
-        build
-    })?;
+    if build.is_some() {
+        p.finish(); // of an unknown shape, the parameters are unknown as well
+    }
     let parts = match (sides, emission) {
         (Some(sides), None) => Some((sides, None)),
         (Some(sides), Some(Some(emission))) => Some((sides, Some(emission))),
@@ -126,7 +125,7 @@ fn pending<'a>(
         Some(id) => id.value.clone(),
         None => format!("{} {}", element.value("type"), index + 1),
     };
-    Some(Pending { name, span, parts, build })
+    Some(Pending { name, span, parts, build: build?? })
 }
 
 /// The mesh file that `filename` names, beside the scene file.

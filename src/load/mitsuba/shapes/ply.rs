@@ -39,7 +39,7 @@ pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
 /// The content of a file as one mesh.
 fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
     let mut reader = Reader::new(bytes);
-    let fault = |error: &dyn std::fmt::Display| format!("it is no readable PLY: {error}");
+    let fault = |error: &dyn std::fmt::Display| format!("it is no readable PLY: {}", one_line(&error.to_string()));
     let header = Parser::<DefaultElement>::new().read_header(&mut reader).map_err(|e| fault(&e))?;
     let mut raw = RawMesh::default();
     for element in header.elements.values() {
@@ -59,6 +59,12 @@ fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
         }
     }
     Ok(raw)
+}
+
+/// The parser's message up to where it gives its grammar, which says nothing to those who have no parser to write.
+fn one_line(message: &str) -> String {
+    let words: Vec<_> = message.split_whitespace().take_while(|word| *word != "Error:").collect();
+    words.join(" ").chars().filter(|c| !c.is_control()).take(200).collect()
 }
 
 /// Positions, and normals and texture coordinates where the header names all of their parts.

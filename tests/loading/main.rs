@@ -1,0 +1,5 @@
+//! Scene files become the descriptions they mean, and faulty ones say where and why.
+
+mod descriptions;
+mod faults;
+mod files;
