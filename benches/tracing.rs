@@ -3,15 +3,16 @@
 //! Rays leave diffuse surfaces, as a path tracer's do after a bounce; shadow rays go from there to points on a lamp.
 //! `quadrics` is a box with 40 spheres and disks.
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use relt::embree::{Device, Geometry, Hits, Rays, Scene, Width};
 use relt::scene::Mesh;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Rays of one measurement: 1.8 MB, and so from the second-level cache at best, as in a large batch of chains.
-const RAYS: usize = 1 << 16;
+/// Rays of one measurement, about as many as a batch of chains has; rays and hits take 0.8 MB. Millisecond samples let
+/// the fastest ones tell the speed even on a busy machine.
+const RAYS: usize = 1 << 14;
 
 fn tracing(criterion: &mut Criterion) {
     let device = Device::new(&std::env::var("ISA").unwrap_or_default()).unwrap_or_else(|error| panic!("{error}"));
@@ -26,7 +27,7 @@ fn tracing(criterion: &mut Criterion) {
         let (bounce, shadow) = rays(&scene, &mesh(folder, lamp));
 
         let mut group = criterion.benchmark_group(format!("{name}/closest"));
-        group.throughput(Throughput::Elements(RAYS as u64));
+        group.sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(RAYS as u64));
         let mut hits = Hits::default();
         for width in Width::ALL {
             group.bench_function(BenchmarkId::from_parameter(width), |bencher| {
@@ -36,7 +37,7 @@ fn tracing(criterion: &mut Criterion) {
         group.finish();
 
         let mut group = criterion.benchmark_group(format!("{name}/shadow"));
-        group.throughput(Throughput::Elements(RAYS as u64));
+        group.sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(RAYS as u64));
         let mut occluded = Vec::new();
         for width in Width::ALL {
             group.bench_function(BenchmarkId::from_parameter(width), |bencher| {

@@ -96,7 +96,7 @@ pub struct Valid<A, const N: usize> {
 pub struct Arguments {
     /// 0: rays are incoherent.
     pub flags: c_int,
-    /// Only GPUs look at it: a restricted mask gained nothing.
+    /// All of them: only GPUs look at it.
     pub feature_mask: c_uint,
     pub context: *mut c_void,
     pub filter: *mut c_void,

@@ -1,8 +1,9 @@
 //! Spheres and disks, which Embree bounds and we intersect.
 //!
-//! Embree has both as native geometry, but there t depends on the packet width in its last bits: for 2 to 7 rays in a
-//! hundred that hit a sphere (4.4.0; AVX2 and AVX-512 alike), and a grazing ray may hit with one width and miss with
-//! another. Called back, we intersect lane by lane in f64: the same for every width, instruction set and version.
+//! Embree has both as native geometry, but there t depends on the packet width in its last bits: in a box with 40 of
+//! them 2 to 7 hits in a hundred differed between single rays and packets, and of a million rays aimed at rims 3 to 9
+//! hit another shape (4.4.0; SSE4.2 to AVX-512). Called back, we intersect lane by lane in f64, and nothing differs
+//! between widths, nor t between instruction sets.
 
 use super::ffi::{Bounds, BoundsArguments, CallbackArguments};
 use glam::{DVec3, Vec3};
