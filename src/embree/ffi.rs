@@ -18,16 +18,13 @@ pub const PROPERTY_NATIVE_RAY8: c_int = 33;
 pub const PROPERTY_NATIVE_RAY16: c_int = 34;
 
 pub const GEOMETRY_TRIANGLE: c_int = 0;
-pub const GEOMETRY_SPHERE_POINT: c_int = 50;
-pub const GEOMETRY_ORIENTED_DISC_POINT: c_int = 52;
+pub const GEOMETRY_USER: c_int = 120;
 
 pub const BUFFER_INDEX: c_int = 0;
 pub const BUFFER_VERTEX: c_int = 1;
-pub const BUFFER_NORMAL: c_int = 3;
 
 pub const FORMAT_UINT3: c_int = 0x5003;
 pub const FORMAT_FLOAT3: c_int = 0x9003;
-pub const FORMAT_FLOAT4: c_int = 0x9004;
 
 pub const SCENE_ROBUST: c_int = 1 << 2;
 pub const BUILD_QUALITY_HIGH: c_int = 2;
@@ -99,7 +96,7 @@ pub struct Valid<A, const N: usize> {
 pub struct Arguments {
     /// 0: rays are incoherent.
     pub flags: c_int,
-    /// Only GPUs look at it: a restricted mask gained nothing.
+    /// All of them: only GPUs look at it.
     pub feature_mask: c_uint,
     pub context: *mut c_void,
     pub filter: *mut c_void,
@@ -131,6 +128,31 @@ pub struct Bounds {
     pub upper: [f32; 3],
     pub align1: f32,
 }
+
+/// `RTCBoundsFunctionArguments`.
+#[repr(C)]
+pub struct BoundsArguments {
+    pub user: *const c_void,
+    pub primitive: c_uint,
+    pub time_step: c_uint,
+    pub bounds: *mut Bounds,
+}
+
+/// `RTCIntersectFunctionNArguments` and `RTCOccludedFunctionNArguments`, which differ in name only.
+#[repr(C)]
+pub struct CallbackArguments {
+    pub valid: *const i32,
+    pub user: *const c_void,
+    pub primitive: c_uint,
+    pub context: *mut c_void,
+    /// `RTCRayHitN` or `RTCRayN`: fields of `lanes` words each, in the order of [`RayHit`].
+    pub rays: *mut f32,
+    pub lanes: c_uint,
+    pub geometry: c_uint,
+}
+
+type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
+type Callback = unsafe extern "C" fn(*const CallbackArguments);
 
 macro_rules! assert_layout {
     ($align:ty, $n:literal: ray $ray:literal, rayhit $rayhit:literal, aligned $aligned:literal) => {
@@ -201,8 +223,12 @@ functions! {
         release_geometry = "rtcReleaseGeometry": unsafe extern "C" fn(GeometryHandle),
         set_shared_buffer = "rtcSetSharedGeometryBuffer": unsafe extern "C" fn(
             GeometryHandle, c_int, c_uint, c_int, *const c_void, usize, usize, usize),
-        set_new_buffer = "rtcSetNewGeometryBuffer": unsafe extern "C" fn(
-            GeometryHandle, c_int, c_uint, c_int, usize, usize) -> *mut c_void,
+        set_user_primitive_count = "rtcSetGeometryUserPrimitiveCount": unsafe extern "C" fn(GeometryHandle, c_uint),
+        set_user_data = "rtcSetGeometryUserData": unsafe extern "C" fn(GeometryHandle, *const c_void),
+        set_bounds_function = "rtcSetGeometryBoundsFunction": unsafe extern "C" fn(
+            GeometryHandle, BoundsFunction, *const c_void),
+        set_intersect_function = "rtcSetGeometryIntersectFunction": unsafe extern "C" fn(GeometryHandle, Callback),
+        set_occluded_function = "rtcSetGeometryOccludedFunction": unsafe extern "C" fn(GeometryHandle, Callback),
         commit_geometry = "rtcCommitGeometry": unsafe extern "C" fn(GeometryHandle),
         attach_geometry_by_id = "rtcAttachGeometryByID": unsafe extern "C" fn(SceneHandle, GeometryHandle, c_uint),
         intersect1 = "rtcIntersect1": Intersect1,

@@ -221,16 +221,20 @@ fn load(path: &Path, origin: Origin) -> Result<Embree, Unusable> {
     // SAFETY: these functions have had these signatures since Embree 3, and the library is never unloaded (below).
     let starting = unsafe { VersionFunctions::load(&library) }.map_err(Unusable::NotEmbree)?;
     let version = ask_version(&starting)?;
-    match version.0 {
-        ..40000 => return Err(Unusable::OldGeneration(version)),
-        40000..OLDEST => return Err(Unusable::OldRelease(version)),
-        TOO_NEW.. => return Err(Unusable::NewGeneration(version)),
-        OLDEST..TOO_NEW => {}
-    }
+    check(version)?;
     // SAFETY: the version was checked, `ffi` declares that version, and the library is never unloaded (below).
     let tracing = unsafe { Functions::load(&library) }.map_err(Unusable::NotEmbree)?;
     std::mem::forget(library);
     Ok(Embree { starting, tracing, version, path: path.to_path_buf(), origin })
+}
+
+fn check(version: Version) -> Result<(), Unusable> {
+    match version.0 {
+        ..40000 => Err(Unusable::OldGeneration(version)),
+        40000..OLDEST => Err(Unusable::OldRelease(version)),
+        OLDEST..TOO_NEW => Ok(()),
+        TOO_NEW.. => Err(Unusable::NewGeneration(version)),
+    }
 }
 
 /// The loader's own words: `libloading` puts them into the source of its error.
@@ -261,5 +265,57 @@ pub fn error_in_words(code: i32) -> &'static str {
         5 => "this processor is not supported: Embree needs at least SSE2, and the options may ask for more",
         6 => "cancelled",
         _ => "unknown error",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What [`find`] says for these places; finding something is not an answer.
+    fn complaint(variable: Option<&str>, system: &[&str], built: Option<&str>) -> String {
+        match find(variable.map(OsString::from), system, built) {
+            Ok(found) => panic!("found {}", found.path.display()),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn no_embree_anywhere_says_where_we_looked_and_how_to_install_it() {
+        let said = complaint(None, &["libnowhere.so.4"], Some("/nowhere/libembree4.so.4"));
+        assert!(said.contains("tried libnowhere.so.4: it cannot be loaded"), "{said}");
+        assert!(said.contains("tried /nowhere/libembree4.so.4: it cannot be loaded"), "{said}");
+        assert!(said.contains("apt-get install libembree4-4") && said.contains("RELT_EMBREE"), "{said}");
+    }
+
+    #[test]
+    fn a_wrong_variable_is_an_error_even_where_the_system_has_embree() {
+        let said = complaint(Some("/nowhere"), &SYSTEM_NAMES, BUILT);
+        assert!(said.starts_with("RELT_EMBREE=/nowhere: there is no such file or folder"), "{said}");
+    }
+
+    #[test]
+    fn another_library_is_told_from_embree() {
+        let libc = "libc.so.6";
+        assert!(complaint(None, &[libc], None).contains("it is not Embree 4: the function rtcNewDevice is missing"));
+    }
+
+    #[test]
+    fn old_and_future_versions_get_a_message_of_their_own() {
+        let said = |version| check(Version(version)).unwrap_err().to_string();
+        assert!(said(31305).starts_with("it is Embree 3.13.5, and relt needs Embree 4.3 or newer"));
+        assert!(said(40200).starts_with("it is Embree 4.2.0, and relt needs 4.3 or newer"));
+        assert!(said(50000).starts_with("it is Embree 5.0.0, and relt knows only Embree 4"));
+        assert!([40300, 40303, 40400, 49999].into_iter().all(|version| check(Version(version)).is_ok()));
+    }
+
+    #[test]
+    fn a_folder_leads_to_the_library_in_it_or_in_its_lib_whatever_its_hash() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(library_at(folder.path()), Err(Unusable::EmptyFolder)));
+        fs::create_dir(folder.path().join("lib")).unwrap();
+        let hashed = folder.path().join("lib/libembree4-0123abcd.so.4");
+        fs::write(&hashed, "").unwrap();
+        assert_eq!(library_at(folder.path()).unwrap(), hashed.canonicalize().unwrap());
     }
 }

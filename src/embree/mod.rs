@@ -14,6 +14,7 @@ mod device;
 mod ffi;
 mod library;
 mod packet;
+mod quadric;
 mod scene;
 
 pub use device::Device;

@@ -2,6 +2,11 @@
 //!
 //! Rays and hits are structures of arrays. A packet is filled from consecutive lanes, traced by one call of Embree
 //! and copied out again; nothing is allocated or checked on the way.
+//!
+//! Hits do not depend on the width, bit for bit: over 10 million rays a scene of each kind — anywhere, after a diffuse
+//! bounce, aimed at edges and corners — on three scenes with SSE4.2, AVX, AVX2 and AVX-512, no id, u, v, t or
+//! occlusion differed (Embree 4.4.0; `tests/embree.rs`). This needs rays not to be marked as coherent, and spheres and
+//! disks of our own (`quadric`). Between instruction sets the last bits of triangle hits do differ.
 
 use super::ffi::{self, Align16, Align32, Align64, Arguments, Ray, RayHit, Valid};
 use super::scene::Scene;

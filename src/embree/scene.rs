@@ -3,9 +3,9 @@
 use super::device::Device;
 use super::ffi::{self, Bounds, GeometryHandle, SceneHandle};
 use super::library::EmbreeError;
+use super::quadric::{self, Quadric};
 use crate::scene::Mesh;
 use glam::Vec3;
-use std::ffi::{c_int, c_void};
 use std::mem::size_of;
 use std::ptr;
 use std::sync::Arc;
@@ -37,8 +37,24 @@ pub enum Geometry {
 pub struct Scene {
     device: Device,
     handle: SceneHandle,
-    /// Keeps alive what Embree reads.
     geometries: Vec<Geometry>,
+    /// What Embree reads: in place, and alive as long as the scene.
+    shapes: Box<[Shape]>,
+}
+
+enum Shape {
+    Triangles(Arc<Mesh>),
+    Quadric(Quadric),
+}
+
+impl Shape {
+    fn new(geometry: &Geometry) -> Shape {
+        match *geometry {
+            Geometry::Triangles(ref mesh) => Shape::Triangles(mesh.clone()),
+            Geometry::Sphere { center, radius } => Shape::Quadric(Quadric::sphere(center, radius)),
+            Geometry::Disk { center, normal, radius } => Shape::Quadric(Quadric::disk(center, normal, radius)),
+        }
+    }
 }
 
 // SAFETY: after its commit a scene is only read, and Embree allows queries from any number of threads.
@@ -48,7 +64,7 @@ unsafe impl Sync for Scene {}
 
 impl Drop for Scene {
     fn drop(&mut self) {
-        // SAFETY: the handle came from `rtcNewScene` and is released only here; `device` and `geometries` are
+        // SAFETY: the handle came from `rtcNewScene` and is released only here; `device` and `shapes` are
         // dropped after this.
         unsafe { (self.device.embree().tracing.release_scene)(self.handle) }
     }
@@ -67,16 +83,17 @@ impl Scene {
             return Err(failed(device.take_error().unwrap_or("unknown error")));
         }
         // From here on the scene is released on every way out.
-        let scene = Scene { device: device.clone(), handle, geometries };
+        let scene =
+            Scene { device: device.clone(), handle, shapes: geometries.iter().map(Shape::new).collect(), geometries };
         // SAFETY: the scene is alive and not shared yet.
         unsafe {
             (functions.set_scene_flags)(handle, ffi::SCENE_ROBUST);
             (functions.set_scene_build_quality)(handle, ffi::BUILD_QUALITY_HIGH);
         }
-        for (id, geometry) in (0..).zip(&scene.geometries) {
-            scene.attach(geometry, id).map_err(failed)?;
+        for (id, shape) in (0..).zip(&scene.shapes) {
+            scene.attach(shape, id).map_err(failed)?;
         }
-        // SAFETY: as above; the buffers that Embree reads from now on are held by `geometries`.
+        // SAFETY: as above; the buffers that Embree reads from now on are held by `shapes`.
         unsafe { (functions.commit_scene)(handle) };
         device.take_error().map_or(Ok(scene), |reason| Err(failed(reason)))
     }
@@ -104,12 +121,11 @@ impl Scene {
         self.handle
     }
 
-    fn attach(&self, geometry: &Geometry, id: u32) -> Result<(), &'static str> {
+    fn attach(&self, shape: &Shape, id: u32) -> Result<(), &'static str> {
         let functions = &self.device.embree().tracing;
-        let kind = match geometry {
-            Geometry::Triangles(_) => ffi::GEOMETRY_TRIANGLE,
-            Geometry::Sphere { .. } => ffi::GEOMETRY_SPHERE_POINT,
-            Geometry::Disk { .. } => ffi::GEOMETRY_ORIENTED_DISC_POINT,
+        let kind = match shape {
+            Shape::Triangles(_) => ffi::GEOMETRY_TRIANGLE,
+            Shape::Quadric(_) => ffi::GEOMETRY_USER,
         };
         // SAFETY: the device is alive; the new geometry is checked before it is used, and released once: the scene
         // holds its own reference.
@@ -118,15 +134,9 @@ impl Scene {
             if handle.is_null() {
                 return Err(self.device.take_error().unwrap_or("unknown error"));
             }
-            match geometry {
-                Geometry::Triangles(mesh) => self.share_mesh(handle, mesh),
-                Geometry::Sphere { center, radius } => {
-                    self.fill(handle, ffi::BUFFER_VERTEX, ffi::FORMAT_FLOAT4, center.extend(*radius).to_array());
-                }
-                Geometry::Disk { center, normal, radius } => {
-                    self.fill(handle, ffi::BUFFER_VERTEX, ffi::FORMAT_FLOAT4, center.extend(*radius).to_array());
-                    self.fill(handle, ffi::BUFFER_NORMAL, ffi::FORMAT_FLOAT3, normal.to_array());
-                }
+            match shape {
+                Shape::Triangles(mesh) => self.share_mesh(handle, mesh),
+                Shape::Quadric(quadric) => self.call_back(handle, quadric),
             }
             (functions.commit_geometry)(handle);
             (functions.attach_geometry_by_id)(self.handle, handle, id);
@@ -138,41 +148,34 @@ impl Scene {
     /// Lets Embree read a mesh in place.
     ///
     /// # Safety
-    /// `handle` is a triangle geometry, and `mesh` belongs to one of `self.geometries`, which outlive it.
+    /// `handle` is a triangle geometry, and `mesh` is one that `self.shapes` keeps alive.
     unsafe fn share_mesh(&self, handle: GeometryHandle, mesh: &Mesh) {
         let share = self.device.embree().tracing.set_shared_buffer;
         let (positions, triangles) = (mesh.padded_positions(), &mesh.triangles);
+        let (vertex, triangle) = (size_of::<Vec3>(), size_of::<[u32; 3]>());
         // The padding, which Embree needs behind the last vertex because it reads four floats, is not counted.
+        let count = positions.len() - 1;
         // SAFETY: pointers, strides and counts describe these slices; `Arc` keeps them in place and unchanged.
         unsafe {
-            let vertices: *const c_void = positions.as_ptr().cast();
-            share(
-                handle,
-                ffi::BUFFER_VERTEX,
-                0,
-                ffi::FORMAT_FLOAT3,
-                vertices,
-                0,
-                size_of::<Vec3>(),
-                positions.len() - 1,
-            );
-            let indices: *const c_void = triangles.as_ptr().cast();
-            share(handle, ffi::BUFFER_INDEX, 0, ffi::FORMAT_UINT3, indices, 0, size_of::<[u32; 3]>(), triangles.len());
+            share(handle, ffi::BUFFER_VERTEX, 0, ffi::FORMAT_FLOAT3, positions.as_ptr().cast(), 0, vertex, count);
+            let indices = triangles.as_ptr().cast();
+            share(handle, ffi::BUFFER_INDEX, 0, ffi::FORMAT_UINT3, indices, 0, triangle, triangles.len());
         }
     }
 
-    /// Gives a geometry a buffer of one item.
+    /// Lets Embree ask us about a sphere or disk.
     ///
     /// # Safety
-    /// `handle` is a geometry that takes such a buffer.
-    unsafe fn fill<const N: usize>(&self, handle: GeometryHandle, buffer: c_int, format: c_int, item: [f32; N]) {
-        // SAFETY: Embree allocates at least one item of `N` floats, or returns null.
+    /// `handle` is a user geometry, and `quadric` stays in place as long as `self.shapes`.
+    unsafe fn call_back(&self, handle: GeometryHandle, quadric: &Quadric) {
+        let functions = &self.device.embree().tracing;
+        // SAFETY: the callbacks get back the pointer to the quadric and take it for nothing else.
         unsafe {
-            let set = self.device.embree().tracing.set_new_buffer;
-            let memory: *mut f32 = set(handle, buffer, 0, format, size_of::<[f32; N]>(), 1).cast();
-            if !memory.is_null() {
-                ptr::copy_nonoverlapping(item.as_ptr(), memory, N);
-            }
+            (functions.set_user_primitive_count)(handle, 1);
+            (functions.set_user_data)(handle, ptr::from_ref(quadric).cast());
+            (functions.set_bounds_function)(handle, quadric::bounds, ptr::null());
+            (functions.set_intersect_function)(handle, quadric::intersect);
+            (functions.set_occluded_function)(handle, quadric::occluded);
         }
     }
 }
