@@ -3,15 +3,14 @@
 use std::sync::Arc;
 
 use relt::{
-    chain::{Recorder, Target},
+    chain::{Recorder, Start, Target, resample},
     film::{Accumulator, Filter, Footprint, Splats},
     path::{Contribution, Contributions},
     rng::{Rng, unit_f32},
     sample::Proposals,
     scene::Rgb,
     tempering::{
-        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, Phase, Statistics, Weights, layer,
-        uniform_mean,
+        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, Statistics, Weights, layer, uniform_mean,
     },
 };
 
@@ -42,7 +41,7 @@ struct Run {
     statistics: Vec<Statistics>,
 }
 
-/// Replica exchange as the renderer does it: a warm-up, then rounds of doubling length.
+/// Replica exchange as the renderer does it: a bootstrap, then rounds of doubling length.
 fn run<F: Fn(f32, f32) -> f32 + Sync>(
     g: F,
     betas: &[f64],
@@ -65,40 +64,46 @@ fn run<F: Fn(f32, f32) -> f32 + Sync>(
     counts[0] = uniform_draws as f64;
     let unit = 1.0;
 
-    let solve = |statistics: &[Statistics]| {
-        let groups: Vec<Group> = statistics
+    let solve = |blocks: &[Block<Vec<u32>>]| {
+        let groups: Vec<Group> = blocks
             .iter()
+            .map(|b| b.recorded())
             .map(|s| Group { uniform: &s.uniform, tempered: &s.tempered, weights: &s.weights })
             .collect();
         Normalisers::solve(&ladder, &groups)
     };
-    let warm_up = 64;
     let mut recorder = Recorder { footprint: &footprint, size, splats: &mut splats };
     for block in &mut blocks {
-        block.advance(&target, warm_up, Phase::WarmUp, &mut recorder);
-        block.flush(Phase::WarmUp, &mut recorder);
+        block.bootstrap(&target, 64, &mut recorder);
+    }
+    let samples: Vec<Start> = blocks.iter_mut().flat_map(|b| b.take_bootstrap()).collect();
+    let starts: Vec<Vec<Start>> =
+        (1..betas.len()).map(|k| resample(&samples, betas[k], BLOCKS * LADDERS, Rng::new(seed), k as u32)).collect();
+    for (b, block) in blocks.iter_mut().enumerate() {
+        let of_block = b * LADDERS..(b + 1) * LADDERS;
+        let starts: Vec<&[Start]> = starts.iter().map(|s| s.get(of_block.clone()).unwrap_or_default()).collect();
+        block.start(&target, &starts);
     }
     let (mut done, mut length) = (0, 64);
     while done < sweeps {
-        let statistics: Vec<Statistics> = blocks.iter().map(|b| b.snapshot(Phase::WarmUp, &mut recorder)).collect();
-        let weights = Weights::new(combination, &ladder, &solve(&statistics).ln_z, &counts, unit);
+        let weights = Weights::new(combination, &ladder, &solve(&blocks).ln_z, &counts, unit);
         for block in &mut blocks {
-            block.advance(&target, length, Phase::Round(&weights), &mut recorder);
-            block.flush(Phase::Round(&weights), &mut recorder);
+            block.advance(&target, length, &weights, &mut recorder);
+            block.flush(&weights, &mut recorder);
         }
         done += length;
         length *= 2;
     }
-    let statistics: Vec<Statistics> = blocks.iter().map(|b| b.snapshot(Phase::WarmUp, &mut recorder)).collect();
+    let normalisers = solve(&blocks);
+    let statistics: Vec<Statistics> = blocks.iter().map(|b| b.recorded().clone()).collect();
     film.deposit(&mut splats);
-    let normalisers = solve(&statistics);
     let samples = (done as usize * BLOCKS * LADDERS) as f64 / f64::from(COLUMNS);
     let hot = film.layer(layer::HOT);
     let tempered = film.layer(layer::TEMPERED);
     let c = normalisers.target.value;
     let image = (0..COLUMNS as usize)
         .map(|i| hot[i][0] / (samples * uniform_draws as f64) + tempered[i][0] / samples * c / unit);
-    let sums: Vec<(f64, f64)> = statistics.iter().map(|s| s.uniform_sum).collect();
+    let sums: Vec<(f64, f64)> = statistics.iter().map(|s| (s.uniform_sum, s.uniform_points as f64)).collect();
     Run { image: image.collect(), uniform: uniform_mean(&sums), normalisers, statistics }
 }
 
@@ -137,7 +142,7 @@ fn images_of_every_ladder_and_combination_agree_with_the_integrals() {
     let truth = columns(peaks);
     for betas in [&[0.0, 1.0][..], &[0.0, 0.5, 1.0], &[0.0, 0.2, 0.4, 0.7, 1.0], &[0.0, 0.01, 1.0]] {
         for combination in [Combination::Target, Combination::Balance] {
-            let runs: Vec<Vec<f64>> = (0..12).map(|s| run(peaks, betas, combination, 1, 2000, s).image).collect();
+            let runs: Vec<Vec<f64>> = (0..12).map(|s| run(peaks, betas, combination, 1, 900, s).image).collect();
             for (i, truth) in truth.iter().enumerate() {
                 let n = runs.len() as f64;
                 let mean = runs.iter().map(|r| r[i]).sum::<f64>() / n;

@@ -27,7 +27,7 @@ pub fn ln2_scaled_exp(x: f32) -> u32 {
     let whole = x.floor();
     let f = whole - x; // in (−1, 0]
     let p = 1.0
-        + f * (0.693_147_2
+        + f * (std::f32::consts::LN_2
             + f * (0.240_226_5 + f * (0.055_504_1 + f * (0.009_618_1 + f * (0.001_333_4 + f * 0.000_154)))));
     let scale = f32::from_bits(((127 + 32 - whole as i32) as u32) << 23);
     (p * scale) as u32

@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn warps_have_the_densities_they_state() {
         // each domain is mapped back to a square by the integral of its density: uniform if that is the density
-        assert_uniform("disk", squares().map(|u| disk(u)).map(|d| [turn(d.x, d.y), d.length_squared()]));
+        assert_uniform("disk", squares().map(disk).map(|d| [turn(d.x, d.y), d.length_squared()]));
         assert_uniform(
             "cosine_hemisphere",
             squares().map(cosine_hemisphere).map(|w| [turn(w.x, w.y), 1.0 - w.z * w.z]),
