@@ -12,7 +12,7 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 const LOCATION: &str = "RELT_EMBREE";
 const FETCH: &str = "RELT_EMBREE_FETCH";
@@ -140,6 +140,7 @@ fn switched_off() -> bool {
 /// Downloads and unpacks the wheel beside its final place, then renames: a build that is killed leaves nothing
 /// half done, and of two builds at a time the second finds the first one's.
 fn obtain(folder: &Path) -> Result<PathBuf, String> {
+    let before = SystemTime::now() - Duration::from_secs(2); // Cargo took its time stamp a moment ago
     let work = out_dir().join("wheel"); // ours alone: Cargo lets no two builds share it
     let _ = fs::remove_dir_all(&work);
     let unpacking = work.join("unpacked");
@@ -151,16 +152,17 @@ fn obtain(folder: &Path) -> Result<PathBuf, String> {
     let wheel = wheel.ok_or("pip downloaded no wheel")?;
     let unzip = |python| output(Command::new(python).args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&unpacking));
     unzip("python3").or_else(|_| unzip("python")).map_err(|why| format!("the wheel cannot be unpacked: {why}"))?;
-    keep_cargo_calm(&unpacking.join(IN_WHEEL[0]));
+    date_back(&unpacking.join(IN_WHEEL[0]), before);
     let _ = fs::rename(&unpacking, folder); // fails if another build was faster
     let _ = fs::remove_dir_all(&work);
     unpacked(folder)
         .ok_or_else(|| format!("{WHEEL} does not hold what it should, or cannot be moved to {}", folder.display()))
 }
 
-/// Dates a file back: one that is newer than the start of this script would make Cargo run it again.
-fn keep_cargo_calm(file: &Path) {
-    let _ = fs::File::options().append(true).open(file).and_then(|file| file.set_modified(SystemTime::UNIX_EPOCH));
+/// Dates a file back to before this script began: Cargo would run the script again for a newer one. No further back,
+/// so that a build of another profile that went without notices it.
+fn date_back(file: &Path, time: SystemTime) {
+    let _ = fs::File::options().append(true).open(file).and_then(|file| file.set_modified(time));
 }
 
 /// Any pip will do; what matters is the hash.
