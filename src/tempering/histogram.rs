@@ -58,17 +58,17 @@ impl Histogram {
         (self.first, self.bins) = (low, bins);
     }
 
-    /// Adds all of another histogram's weights.
-    pub fn merge(&mut self, other: &Histogram) {
-        self.dark += other.dark;
+    /// Adds `factor` times all of another histogram's weights.
+    pub fn merge(&mut self, other: &Histogram, factor: f64) {
+        self.dark += factor * other.dark;
         for (i, bin) in other.bins.iter().enumerate().filter(|(_, b)| b.weight > 0.0) {
             let number = other.first + i as i64;
             if number < self.first || number >= self.first + self.bins.len() as i64 {
                 self.grow(number);
             }
             let mine = &mut self.bins[(number - self.first) as usize];
-            mine.weight += bin.weight;
-            mine.moment += bin.moment;
+            mine.weight += factor * bin.weight;
+            mine.moment += factor * bin.moment;
         }
     }
 
@@ -114,7 +114,7 @@ mod tests {
         }
         a.add(f64::NEG_INFINITY, 2.0);
         all.add(f64::NEG_INFINITY, 2.0);
-        b.merge(&a);
+        b.merge(&a, 1.0);
         assert_eq!((b.total(), b.dark()), (all.total(), 2.0));
         for ((v, w), (v2, w2)) in b.lit().zip(all.lit()) {
             assert!((v - v2).abs() < 1e-12 && w == w2);
