@@ -1,11 +1,18 @@
 //! `relt info`: what a scene uses, and what is left out because it does not.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use clap::Args;
 
 use super::failure::Failure;
 use super::scene::{Opened, SceneArguments};
+use crate::embree::{Device, Scene as Tracer};
+use crate::film::{Accumulator, Filter};
+use crate::path::Layout;
+use crate::scene::description::FilmDescription;
+use crate::scene::{Features, Kernel, Scene, materials};
+use crate::tempering::LAYERS;
 
 /// Prints what a scene uses, and what is therefore left out
 #[derive(Args)]
@@ -22,13 +29,165 @@ pub(super) fn run(arguments: Info) -> Result<(), Failure> {
     }
     let opened = arguments.scene.open()?;
     // Whoever reads may have read enough, as `head` does.
-    drop(writeln!(io::stdout(), "{}", describe(&opened)));
+    drop(write!(io::stdout(), "{}", report(&opened)));
     Ok(())
 }
 
-/// CONNECT: the report's text.
-fn describe(opened: &Opened) -> String {
-    let mut lines = vec![opened.device.description(), format!("{:#?}", opened.scene.features)];
-    lines.extend(opened.warnings.iter().map(|warning| format!("warning: {warning}")));
-    lines.join("\n")
+/// One section after another, each with its name in the margin.
+fn report(opened: &Opened) -> String {
+    let Opened { device, scene, warnings } = opened;
+    let sections = [
+        ("film", film(&scene.film)),
+        ("paths", paths(&scene.features)),
+        ("shapes", shapes(&scene.features)),
+        ("materials", materials(scene)),
+        ("lights", lights(&scene.features)),
+        ("dimensions", dimensions(&scene.features)),
+        ("kernel", kernel(&scene.features)),
+        ("embree", embree(device, &scene.features)),
+        ("warnings", warnings.clone()),
+    ];
+    let mut text = String::new();
+    for (name, lines) in sections {
+        for (i, line) in lines.iter().enumerate() {
+            text += &format!("{:<12}{line}\n", if i == 0 { name } else { "" });
+        }
+    }
+    text
+}
+
+fn film(film: &FilmDescription) -> Vec<String> {
+    let filter = match film.filter {
+        Filter::Box => "box filter: a sample goes to one pixel".into(),
+        Filter::Tent { radius } => format!("tent filter of radius {radius}"),
+        Filter::Gaussian { stddev } => format!("Gaussian filter of standard deviation {stddev}"),
+    };
+    let mebibytes = |layers: usize| {
+        let bytes = film.width as usize * film.height as usize * Accumulator::BYTES_PER_PIXEL * layers;
+        bytes as f64 / f64::from(1 << 20)
+    };
+    vec![
+        format!("{} × {} pixels, {filter}", film.width, film.height),
+        format!("memory: {:.1} MiB for path and mlt, {:.1} MiB for re", mebibytes(1), mebibytes(LAYERS)),
+    ]
+}
+
+fn paths(features: &Features) -> Vec<String> {
+    let longest = match features.integrator.max_depth {
+        Some(1) => "1 edge: only lights seen directly".into(),
+        Some(edges) => format!("up to {edges} edges"),
+        None => "of any length".into(),
+    };
+    let roulette = match Layout::new(features).roulette_from() {
+        Some(bounce) => format!("Russian roulette from bounce {} on", bounce + 1),
+        None => "no Russian roulette".into(),
+    };
+    vec![format!("{longest}, {roulette}")]
+}
+
+fn shapes(features: &Features) -> Vec<String> {
+    let counts = &features.shapes;
+    used_and_left_out(&[
+        (features.triangles, "triangles"),
+        (counts.flat_meshes, "meshes without shading normals"),
+        (counts.smooth_meshes, "meshes with shading normals"),
+        (counts.spheres, "spheres"),
+        (counts.disks, "disks"),
+    ])
+}
+
+fn lights(features: &Features) -> Vec<String> {
+    used_and_left_out(&[
+        (features.area_lights, "area"),
+        (features.point_lights, "point"),
+        (features.infinite_lights, "constant"),
+    ])
+}
+
+/// How many of each kind there are, and the kinds of which there is none.
+fn used_and_left_out(kinds: &[(usize, &str)]) -> Vec<String> {
+    let used: Vec<String> = kinds.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{what}: {n}")).collect();
+    let unused: Vec<&str> = kinds.iter().filter(|(n, _)| *n == 0).map(|(_, what)| *what).collect();
+    [used.join(", ")].into_iter().filter(|line| !line.is_empty()).chain(left_out(&unused)).collect()
+}
+
+fn left_out(what: &[&str]) -> Option<String> {
+    (!what.is_empty()).then(|| format!("left out: {}", what.join(", ")))
+}
+
+/// The kinds of materials with their lobes.
+fn materials(scene: &Scene) -> Vec<String> {
+    let mut kinds = BTreeMap::new();
+    for material in scene.materials() {
+        *kinds.entry((material.name(), material.lobes().in_words().join(" and "))).or_insert(0) += 1;
+    }
+    let used = kinds.iter().map(|((name, lobes), n)| format!("{n} {name}: {lobes}"));
+    let unused: Vec<_> =
+        materials::KNOWN.iter().copied().filter(|name| !scene.features.materials.contains_key(name)).collect();
+    used.chain(left_out(&unused)).collect()
+}
+
+/// Primary dimensions of the film position and, bounce by bounce, of the decisions there.
+fn dimensions(features: &Features) -> Vec<String> {
+    let layout = Layout::new(features);
+    let mut lines = vec!["film position: 2".to_owned()];
+    // the last vertex of the longest paths decides nothing
+    let bounces = layout.max_depth() - 1;
+    let first_of_each_kind = [Some(0), layout.roulette_from()].into_iter().flatten().filter(|first| *first < bounces);
+    let mut firsts: Vec<u16> = first_of_each_kind.collect();
+    firsts.dedup();
+    for (i, &first) in firsts.iter().enumerate() {
+        let next = firsts.get(i + 1).copied();
+        let range = match next.or(features.integrator.max_depth.map(|_| bounces)) {
+            Some(next) if next == first + 1 => format!("bounce {next}"),
+            Some(next) => format!("bounces {} to {next}", first + 1),
+            None => format!("bounces from {} on", first + 1),
+        };
+        let names = layout.describe(first);
+        let blocks = if layout.choices(first).is_some() { "two blocks" } else { "one block" };
+        lines.push(format!("{range}: {} ({}), drawn in {blocks} of four", names.len(), counted(&names)));
+    }
+    let mut unused = vec!["lens"];
+    for (needed, what) in [
+        (features.lobe_choice, "choice of lobe"),
+        (features.light_choice(), "choice of light"),
+        (layout.roulette_from().is_some(), "roulette"),
+    ] {
+        if !needed {
+            unused.push(what);
+        }
+    }
+    lines.extend(left_out(&unused));
+    lines
+}
+
+/// `direction 2, roulette 1`: names that follow each other, with how often each does.
+fn counted(names: &[&str]) -> String {
+    let runs = names.chunk_by(|a, b| a == b);
+    runs.map(|run| format!("{} {}", run[0], run.len())).collect::<Vec<_>>().join(", ")
+}
+
+fn kernel(features: &Features) -> Vec<String> {
+    match features.kernel() {
+        Kernel::Diffuse => vec![
+            "diffuse: diffuse materials on flat meshes, lit by meshes".to_owned(),
+            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, background, points"
+                .to_owned(),
+        ],
+        Kernel::Full => {
+            vec![format!("full, for the scene has {}", features.beyond_diffuse().join(", "))]
+        }
+    }
+}
+
+fn embree(device: &Device, features: &Features) -> Vec<String> {
+    let native: Vec<String> = device.native_widths().iter().map(ToString::to_string).collect();
+    let mut lines = vec![
+        device.description(),
+        format!("{}; packets native to this processor: {}", Tracer::BUILT_WITH, native.join(", ")),
+    ];
+    if features.shapes.spheres + features.shapes.disks == 0 {
+        lines.push("left out: user geometry".to_owned());
+    }
+    lines
 }

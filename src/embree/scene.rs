@@ -71,6 +71,9 @@ impl Drop for Scene {
 }
 
 impl Scene {
+    /// Flags and quality of all hierarchies, in Embree's words.
+    pub const BUILT_WITH: &str = "scene flag ROBUST, build quality HIGH";
+
     /// Builds the hierarchy, with watertight intersections and at the highest quality.
     pub fn new(device: &Device, geometries: Vec<Geometry>) -> Result<Scene, EmbreeError> {
         let functions = &device.embree().tracing;

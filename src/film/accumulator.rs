@@ -123,6 +123,9 @@ pub struct Accumulator {
 }
 
 impl Accumulator {
+    /// Memory that a pixel takes in each layer: red, green, blue and weight, 128 bits each.
+    pub const BYTES_PER_PIXEL: usize = size_of::<Cell>();
+
     /// All sums zero. `unit` is a typical magnitude of the values to come (the scene's largest radiance, say); only
     /// the binary order of magnitude matters, and 0, as a black scene would give, counts as 1.
     ///

@@ -48,7 +48,7 @@ impl Progress {
             return Progress::plain(io::stderr(), stop);
         }
         let bar = ProgressBar::with_draw_target(Some(BAR_STEPS), ProgressDrawTarget::stderr());
-        bar.set_style(ProgressStyle::with_template("{bar:24} {wide_msg}").expect("a template known to be right"));
+        bar.set_style(ProgressStyle::with_template("{bar:24} {msg}").expect("a template known to be right"));
         Progress { stop, display: Display::Terminal(bar) }
     }
 
@@ -75,6 +75,9 @@ fn locked(plain: &Mutex<Plain>) -> std::sync::MutexGuard<'_, Plain> {
 
 impl Observer for Progress {
     fn started(&self, start: &RunStart) {
+        if let Display::Terminal(bar) = &self.display {
+            bar.set_message("starting");
+        }
         self.say(&heading(start));
     }
 
@@ -84,7 +87,8 @@ impl Observer for Progress {
             Display::Quiet => {}
             Display::Terminal(bar) => {
                 bar.set_position((status.fraction() * BAR_STEPS as f64) as u64);
-                bar.set_message(line(status) + stopping);
+                let rates = rates(status).map(|rates| format!("\n{rates}")).unwrap_or_default();
+                bar.set_message(pace(status) + stopping + &rates); // two lines fit 80 columns, one would not
             }
             Display::Plain(plain) => {
                 let mut plain = locked(plain);
@@ -134,14 +138,27 @@ pub fn heading(start: &RunStart) -> String {
 
 /// ` 42.0 %, 1.23 M mutations/s, 12 s left, acceptance 0.43, swaps 0.61–0.70`
 pub fn line(status: &Status) -> String {
+    [Some(pace(status)), rates(status)].into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// ` 42.0 %, 1.23 M mutations/s, 12 s left`
+fn pace(status: &Status) -> String {
     let mut words = vec![
         format!("{:5.1} %", 100.0 * status.fraction()),
         format!("{} mutations/s", with_unit(status.mutations_per_second())),
     ];
     words.extend(status.time_left().map(|left| format!("{} left", rough(left))));
-    words.extend(span(&status.acceptance).map(|rates| format!("acceptance {rates}")));
-    words.extend(span(&status.swap).map(|rates| format!("swaps {rates}")));
     words.join(", ")
+}
+
+/// `acceptance 0.43, swaps 0.61–0.70`; `None` without chains and before they move.
+fn rates(status: &Status) -> Option<String> {
+    if status.acceptance.iter().all(|rate| *rate == 0.0) {
+        return None;
+    }
+    let acceptance = span(&status.acceptance).map(|rates| format!("acceptance {rates}"));
+    let swaps = span(&status.swap).map(|rates| format!("swaps {rates}"));
+    Some(acceptance.into_iter().chain(swaps).collect::<Vec<_>>().join(", "))
 }
 
 /// What is said at the end: files, effort, warnings.

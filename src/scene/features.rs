@@ -112,9 +112,21 @@ impl Features {
 
     /// The kernel to run: the smallest that does all the scene needs.
     pub fn kernel(&self) -> Kernel {
-        let flat = self.shapes.smooth_meshes + self.shapes.spheres + self.shapes.disks == 0;
-        let diffuse = self.materials.keys().all(|&name| name == "diffuse");
-        if flat && diffuse && self.point_lights + self.infinite_lights == 0 { Kernel::Diffuse } else { Kernel::Full }
+        if self.beyond_diffuse().is_empty() { Kernel::Diffuse } else { Kernel::Full }
+    }
+
+    /// What the scene needs and [`Kernel::Diffuse`] cannot do, one short phrase each.
+    pub fn beyond_diffuse(&self) -> Vec<String> {
+        let materials =
+            self.materials.keys().filter(|name| **name != "diffuse").map(|name| format!("{name} materials"));
+        let others = [
+            (self.shapes.smooth_meshes, "shading normals"),
+            (self.shapes.spheres, "spheres"),
+            (self.shapes.disks, "disks"),
+            (self.point_lights, "point lights"),
+            (self.infinite_lights, "lights at infinity"),
+        ];
+        materials.chain(others.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned())).collect()
     }
 }
 

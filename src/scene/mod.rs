@@ -81,6 +81,11 @@ impl Scene {
             materials: description.materials,
         })
     }
+
+    /// All materials.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
 }
 
 fn geometry(g: &ShapeGeometry) -> embree::Geometry {

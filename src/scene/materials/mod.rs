@@ -66,6 +66,16 @@ impl Lobes {
         u8::from(self.smooth) + u8::from(self.delta_reflection) + u8::from(self.delta_transmission) > 1
     }
 
+    /// The lobes there are, one short phrase each.
+    pub fn in_words(self) -> Vec<&'static str> {
+        let named = [
+            (self.smooth, "smooth lobe"),
+            (self.delta_reflection, "perfect reflection"),
+            (self.delta_transmission, "perfect refraction"),
+        ];
+        named.into_iter().filter(|(there, _)| *there).map(|(_, name)| name).collect()
+    }
+
     /// Whether light passes through.
     pub fn transmit(self) -> bool {
         self.delta_transmission
