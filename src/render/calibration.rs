@@ -11,8 +11,8 @@ use crate::{
     scene::Scene,
 };
 
-/// Lanes of the trial batch; those of a block.
-const LANES: u64 = 256;
+/// Lanes of the trial batch, and paths whose rays it records; those of a block.
+pub const LANES: u64 = 256;
 /// Batches of rays that are tried.
 const BATCHES: u64 = 8;
 /// Each width's time is the least of this many repetitions.

@@ -14,6 +14,6 @@ pub mod settings;
 pub mod status;
 
 pub use output::{Output, Picture};
-pub use run::{Job, Outcome, RenderError, run};
+pub use run::{Job, Outcome, RenderError, engine, run};
 pub use settings::{Combine, LadderChoice, Method, PacketChoice, Settings};
 pub use status::{Observer, RunStart, Status, Summary};
