@@ -95,6 +95,7 @@ impl Normalisers {
         }
         let problem = Problem {
             betas: active.iter().map(|&k| betas[k]).collect(),
+            ln_counts: active.iter().map(|&k| counts[k].ln()).collect(),
             counts: active.iter().map(|&k| counts[k]).collect(),
         };
         let solution = problem.maximise(&bins);
@@ -109,6 +110,7 @@ impl Normalisers {
 struct Problem {
     betas: Vec<f64>,
     counts: Vec<f64>,
+    ln_counts: Vec<f64>,
 }
 
 impl Problem {
@@ -116,7 +118,7 @@ impl Problem {
     fn memberships(&self, v: f64, x: &[f64], p: &mut [f64]) -> f64 {
         let mut largest = f64::NEG_INFINITY;
         for (l, p) in p.iter_mut().enumerate() {
-            *p = if self.counts[l] > 0.0 { self.counts[l].ln() + self.betas[l] * v - x[l] } else { f64::NEG_INFINITY };
+            *p = self.ln_counts[l] + self.betas[l] * v - x[l];
             largest = largest.max(*p);
         }
         let mut sum = 0.0;
