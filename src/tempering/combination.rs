@@ -45,13 +45,13 @@ impl Weights {
         let ln_target = if known { ln_zeta[ln_zeta.len() - 1] } else { 0.0 };
         let ln_share: Vec<f64> = (0..ladder.rungs())
             .map(|k| match () {
-                () if k == 0 => counts[0].ln(),
-                () if known && ln_zeta[k].is_finite() => counts[k].ln() - ln_zeta[k],
+                () if k == 0 => libm::log(counts[0]),
+                () if known && ln_zeta[k].is_finite() => libm::log(counts[k]) - ln_zeta[k],
                 () => f64::NEG_INFINITY,
             })
             .collect();
         let scale = (0..ladder.rungs())
-            .map(|k| if ln_share[k].is_finite() { unit * counts[k] * (-ln_target).exp() } else { 0.0 })
+            .map(|k| if ln_share[k].is_finite() { unit * counts[k] * libm::exp(-ln_target) } else { 0.0 })
             .collect();
         Weights { combination, betas: ladder.betas().to_vec(), ln_share, scale, unit }
     }
