@@ -84,6 +84,7 @@ impl Counter {
 
 /// Ten rounds of Philox4x32 on N counters side by side.
 #[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "four arrays in step, in the form that vectorises")]
 fn philox<const N: usize>(mut c: [[u32; N]; 4], mut key: [u32; 2]) -> [[u32; N]; 4] {
     for _ in 0..ROUNDS {
         for j in 0..N {
