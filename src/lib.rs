@@ -8,6 +8,22 @@
 //! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
 //! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines.
+//!
+//! ```
+//! use std::{path::Path, sync::atomic::AtomicBool};
+//!
+//! use relt::{embree, load, render, scene::Scene};
+//!
+//! let path = Path::new("scenes/cornell-box/scene.xml");
+//! let description = load::scene(path, &[("res".into(), "16".into())])?;
+//! let scene = Scene::new(&embree::Device::new("")?, description)?;
+//!
+//! let settings = render::Settings { mutations_per_pixel: Some(4.0), ..Default::default() };
+//! let job = render::Job { scene: &scene, scene_name: "box".into(), settings, stop: &AtomicBool::new(false) };
+//! let outcome = render::run(&job, &())?; // `()` observes nothing
+//! assert!(outcome.picture.image.mean().iter().all(|channel| *channel > 0.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod chain;
 pub mod cli;

@@ -17,7 +17,7 @@ pub(super) struct SceneArguments {
     #[arg(value_name = "SCENE")]
     pub path: PathBuf,
 
-    /// Sets a parameter that the file declares with <default name="…">; may be repeated
+    /// Sets a parameter that the file declares as a `default`; may be repeated
     #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = values::define)]
     pub defines: Vec<(String, String)>,
 }

@@ -28,7 +28,7 @@ pub fn uniform_mean(groups: &[(f64, f64)]) -> Estimate {
 /// (sandwich with the groups' gradients). Consistent; bias O(1/N).
 ///
 /// States of chains are correlated, uniform points are not, so the states of tempered rungs count for a fraction of
-/// their number: the one of [`DISCOUNTS`] that makes the standard error least. Without that, four strongly correlated
+/// their number: the one of `DISCOUNTS` that makes the standard error least. Without that, four strongly correlated
 /// rungs made the estimate worse than the mean of the uniform rung alone; in the limit of a small fraction it is that
 /// mean.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use crate::scene::{Rgb, parameters::Parameters};
 
 /// Perfect reflection weighted by the conductor's Fresnel reflectance.
 ///
-/// Parameters: either `material` (a name from [`PRESETS`]) or the complex refractive index `eta` + i `k`; with
+/// Parameters: either `material` (a name from `PRESETS`) or the complex refractive index `eta` + i `k`; with
 /// neither, or with the material `none` alone, a mirror that reflects everything, as in Mitsuba.
 /// `specular_reflectance` multiplies it, 0…1, default 1.
 #[derive(Clone, Copy, Debug)]

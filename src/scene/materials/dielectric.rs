@@ -12,7 +12,7 @@ use crate::scene::{
 /// (n₁/n₂)², as radiance is when a beam narrows.
 ///
 /// Parameters: `int_ior` and `ext_ior`, the refractive index behind and before the surface, a number > 0 or a
-/// name from [`INDICES`] (defaults `bk7` and `air`); `specular_reflectance`, `specular_transmittance`, 0…1,
+/// name from `INDICES` (defaults `bk7` and `air`); `specular_reflectance`, `specular_transmittance`, 0…1,
 /// default 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
