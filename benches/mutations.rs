@@ -23,7 +23,8 @@ mod support;
 /// Sweeps before the measurement: past the independent samples that chains start from, which take 8, and so many
 /// that hardly a round begins within it.
 const WARM_START: u64 = 32;
-/// Sweeps that are measured at a time, as in a slice of the render loop: splats are deposited at its end.
+/// Sweeps that are measured at a time, as in a slice of the render loop: splats are deposited at its end. So many that
+/// `path`, which takes pixels in their order, goes through whole pictures.
 const SWEEPS: u64 = 4;
 /// Batches of paths whose rays are recorded.
 const BATCHES: u64 = 64;
@@ -77,7 +78,7 @@ fn warm_up(engine: &mut dyn Engine, stage: &Stage, name: &str) {
         engine.advance(stage, WARM_START);
     }
     let before = engine.counts();
-    engine.advance(stage, 1);
+    engine.advance(stage, SWEEPS);
     let after = engine.counts();
     println!("{name}: {:.2} rays a mutation", ratio(after.rays - before.rays, after.mutations - before.mutations));
 }
