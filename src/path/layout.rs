@@ -1,6 +1,6 @@
 //! Which primary dimensions decide what.
 
-use crate::scene::Features;
+use crate::scene::{Features, description::Integrator};
 
 /// The primary dimensions of a camera path, laid out by bounce so that a small step in one decision moves that
 /// decision and no other.
@@ -19,18 +19,15 @@ pub struct Layout {
     light_choice: bool,
 }
 
-/// The longest path in edges where the scene sets no limit: bounded so that blocks can be numbered; with survival
-/// at most 0.95 a bounce, fewer than one path in 10⁷⁰ would be longer.
-const LIMIT: u16 = 4096;
-
 impl Layout {
     /// The layout for that scene.
     pub fn new(features: &Features) -> Layout {
-        let max_depth = features.integrator.max_depth.map_or(LIMIT, |d| d.min(u32::from(LIMIT)) as u16);
+        let max_depth =
+            features.integrator.max_depth.map_or(Integrator::LONGEST, |d| d.min(Integrator::LONGEST)) as u16;
         Layout {
             choices: features.lobe_choice || features.light_choice(),
             // a path has bounce + 1 edges when its roulette is played
-            roulette_from: features.integrator.rr_depth.saturating_sub(1).min(u32::from(LIMIT)) as u16,
+            roulette_from: features.integrator.rr_depth.saturating_sub(1).min(Integrator::LONGEST) as u16,
             max_depth,
             lobe_choice: features.lobe_choice,
             light_choice: features.light_choice(),

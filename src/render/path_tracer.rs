@@ -18,6 +18,7 @@ use crate::{
 /// The method at work.
 pub struct PathTracer {
     plan: Plan,
+    order: PixelOrder,
     film: Accumulator,
     blocks: Vec<Block>,
 }
@@ -48,7 +49,12 @@ impl PathTracer {
             evaluator.points.reserve(0);
             Block { number, evaluator, nowhere: Points::new(0), splats: Splats::new(1), sweeps: 0, sum_g: 0.0 }
         };
-        PathTracer { plan, film: stage.accumulator(1), blocks: (0..plan.blocks).map(block).collect() }
+        PathTracer {
+            plan,
+            order: PixelOrder::new(stage.pixels()),
+            film: stage.accumulator(1),
+            blocks: (0..plan.blocks).map(block).collect(),
+        }
     }
 }
 
@@ -62,10 +68,10 @@ impl Engine for PathTracer {
     }
 
     fn advance(&mut self, stage: &Stage, sweeps: u64) {
-        let (plan, film) = (self.plan, &self.film);
+        let (plan, order, film) = (self.plan, &self.order, &self.film);
         self.blocks.par_iter_mut().for_each(|block| {
             for _ in 0..sweeps {
-                block.sweep(stage, &plan);
+                block.sweep(stage, &plan, order);
             }
             film.deposit(&mut block.splats);
         });
@@ -101,12 +107,12 @@ impl Engine for PathTracer {
 }
 
 impl Block {
-    fn sweep(&mut self, stage: &Stage, plan: &Plan) {
+    fn sweep(&mut self, stage: &Stage, plan: &Plan, order: &PixelOrder) {
         let first = (self.sweeps * plan.blocks as u64 + self.number as u64) * plan.lanes() as u64;
         for lane in 0..plan.lanes() {
             self.evaluator.counters[lane].step = self.sweeps;
             let words = stage.rng.words(self.evaluator.counters[lane], 0);
-            let pixel = (first + lane as u64) % stage.pixels();
+            let pixel = order.pixel(first + lane as u64);
             self.evaluator.points.set(0, lane, within_pixel(pixel, stage.size(), words));
         }
         self.evaluator.evaluate(&stage.mapping, &self.nowhere);
@@ -116,6 +122,40 @@ impl Block {
             recorder.splat(0, contribution, 1.0, 1.0);
         }
         self.sweeps += 1;
+    }
+}
+
+/// The order in which pixels get their samples: every pixel as often as any other, short runs of neighbours (whose rays
+/// are coherent) scattered over the film, so that an unfinished pass covers it evenly.
+struct PixelOrder {
+    pixels: u64,
+    runs: u64,
+    /// Runs from one to the next in order; has no divisor in common with their number.
+    stride: u64,
+}
+
+/// Neighbouring pixels in a run; a packet of rays.
+const RUN: u64 = 16;
+
+impl PixelOrder {
+    fn new(pixels: u64) -> PixelOrder {
+        let runs = pixels.div_ceil(RUN);
+        // the golden section spreads any number of first runs evenly
+        let golden = ((runs as f64 * 0.618_033_988_75) as u64).max(1);
+        let common = |mut a: u64, mut b: u64| {
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        };
+        let stride = (golden..).find(|s| common(*s, runs) == 1).expect("one number in `runs` is coprime to it");
+        PixelOrder { pixels, runs, stride }
+    }
+
+    /// The pixel of the n-th sample. Where runs do not fill the film evenly, a few pixels come twice in a pass.
+    fn pixel(&self, n: u64) -> u64 {
+        let run = u128::from(n / RUN) * u128::from(self.stride) % u128::from(self.runs);
+        (run as u64 * RUN + n % RUN) % self.pixels
     }
 }
 
@@ -134,6 +174,22 @@ fn within_pixel(pixel: u64, [width, height]: [u32; 2], words: [u32; 4]) -> [u32;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_pixel_gets_its_samples_and_an_unfinished_pass_is_even() {
+        for pixels in [1, 7, 16, 100, 65536, 1920 * 1080] {
+            let order = PixelOrder::new(pixels);
+            let mut counts = vec![0; pixels as usize];
+            let pass = order.runs * RUN;
+            (0..pass).for_each(|n| counts[order.pixel(n) as usize] += 1);
+            let often = 1 + pass / pixels;
+            assert!(counts.iter().all(|c| (1..=often).contains(c)), "{pixels}");
+        }
+        let order = PixelOrder::new(65536);
+        let mut quarters = [0; 4];
+        (0..65536 / 10).for_each(|n| quarters[(order.pixel(n) / 16384) as usize] += 1);
+        assert!(quarters.iter().all(|q| (1500..1800).contains(q)), "{quarters:?}");
+    }
 
     #[test]
     fn film_positions_lie_within_their_pixel() {

@@ -35,6 +35,12 @@ pub struct Integrator {
     pub rr_depth: u32,
 }
 
+impl Integrator {
+    /// Longest path in edges that primary dimensions can be numbered for. Also the limit where a scene sets none: with
+    /// survival of at most 0.95 a bounce, fewer than one path in 10⁷⁰⁰ would be longer.
+    pub const LONGEST: u32 = 32_000;
+}
+
 /// Which extent of the film the field of view spans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FovAxis {

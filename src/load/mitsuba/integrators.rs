@@ -26,9 +26,10 @@ pub fn read(element: &Element, faults: &Faults) -> Option<Integrator> {
 fn path(p: &mut ElementParameters) -> Integrator {
     let max_depth = match p.integer("max_depth") {
         None | Some(-1) => None,
-        Some(depth) if (1..=u32::MAX.into()).contains(&depth) => Some(depth as u32),
+        Some(depth) if (1..=Integrator::LONGEST.into()).contains(&depth) => Some(depth as u32),
         Some(depth) => {
-            p.fault("max_depth", format!("max_depth is {depth}; accepted: -1 (no limit) or 1 and more"));
+            let longest = Integrator::LONGEST;
+            p.fault("max_depth", format!("max_depth is {depth}; accepted: -1 (no limit) or 1 to {longest}"));
             None
         }
     };
