@@ -1,9 +1,14 @@
 //! What a splat costs: spreading it over pixels and depositing it.
 
 use std::hint::black_box;
+use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use relt::film::{Accumulator, Filter, Footprint, Splat, Splats};
+
+/// Time before and while a benchmark is measured: enough for nanoseconds.
+const WARM_UP: Duration = Duration::from_millis(200);
+const MEASUREMENT: Duration = Duration::from_millis(800);
 
 /// Splats a worker brings at a time.
 const BATCH: usize = 4096;
@@ -13,6 +18,7 @@ const BATCHES: usize = 64;
 
 fn deposit(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/deposit");
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
     group.throughput(Throughput::Elements(BATCH as u64));
     for size in [256, 1024] {
         let film = Accumulator::new(size, size, 1, 20.0);
@@ -38,6 +44,7 @@ fn deposit(c: &mut Criterion) {
 
 fn spread(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/spread");
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
     group.throughput(Throughput::Elements(1));
     for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }] {
         let footprint = Footprint::new(filter, 256, 256);

@@ -164,7 +164,11 @@ fn ladders(criterion: &mut Criterion) {
         // g^β has the normaliser 4^β/(2β + 1)
         let ln_z: Vec<f64> = ladder.betas().iter().map(|beta| beta * 4f64.ln() - (2.0 * beta + 1.0).ln()).collect();
         let weights = Weights::new(Combination::Balance, &ladder, &ln_z, &vec![1.0; rungs], 1.0);
-        let mut block = Block::new(ladder, Rng::new(0), 0, LANES as usize / rungs, 1);
+        // as many uniform points as replicas that move, as the renderer draws them
+        let draws = rungs - 1;
+        let ladders = LANES as usize / (2 * draws);
+        let mut block = Block::new(ladder, Rng::new(0), 0, ladders, draws);
+        group.throughput(Throughput::Elements((ladders * 2 * draws) as u64));
         let mut splats = Splats::new(LAYERS);
         group.bench_function(BenchmarkId::from_parameter(rungs), |bencher| {
             bencher.iter(|| {
