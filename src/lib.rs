@@ -9,7 +9,7 @@
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
 //! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines.
 //!
-//! ```
+//! ```standalone_crate
 //! use std::{path::Path, sync::atomic::AtomicBool};
 //!
 //! use relt::{embree, load, render, scene::Scene};
