@@ -49,6 +49,11 @@ impl Splats {
         self.layers[layer].push(splat);
     }
 
+    /// The splats waiting for a layer, in the order they came.
+    pub fn layer(&self, layer: usize) -> &[Splat] {
+        &self.layers[layer]
+    }
+
     /// Number of splats waiting, all layers together.
     pub fn len(&self) -> usize {
         self.layers.iter().map(Vec::len).sum()

@@ -34,7 +34,7 @@ impl Filter {
             Filter::Box => f64::from(x.abs() <= radius),
             Filter::Tent { .. } => (1.0 - x.abs() / radius).max(0.0),
             Filter::Gaussian { stddev } => {
-                let bell = |x: f64| (-x * x / (2.0 * f64::from(stddev).powi(2))).exp();
+                let bell = |x: f64| libm::exp(-x * x / (2.0 * f64::from(stddev).powi(2)));
                 (bell(x) - bell(radius)).max(0.0)
             }
         }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// A right-handed orthonormal frame around a normal.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// First tangent.
     pub s: Vec3,

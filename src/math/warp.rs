@@ -19,9 +19,9 @@ pub fn disk(u: [f32; 2]) -> Vec2 {
     if a == 0.0 && b == 0.0 {
         return Vec2::ZERO;
     }
-    // an eighth of a turn for |minor| = |major|; the sign of the minor axis runs with the angle
+    // an eighth of a turn for |minor| = |major|; negative radii reach the other half, so turns lie in [−1/8, 3/8]
     let (r, turn) = if a.abs() > b.abs() { (a, 0.125 * (b / a)) } else { (b, 0.25 - 0.125 * (a / b)) };
-    let (s, c) = sin_cos_turn(turn + 1.0 - (turn + 1.0).floor());
+    let (s, c) = sin_cos_turn(turn);
     Vec2::new(r * c, r * s)
 }
 

@@ -9,7 +9,7 @@ use crate::{
     rng::unit_f32,
     sample::Block,
     scene::{
-        LightSample, NO_LIGHT, Profile, Rgb, Scene, Surface,
+        NO_LIGHT, Profile, Rgb, Scene, Surface,
         materials::{Evaluation, Material, Scatter, ScatterSample},
     },
 };
@@ -86,10 +86,8 @@ fn power_heuristic(a: f32, b: f32) -> f32 {
 /// Radiance along an edge that left the scene.
 #[inline(always)]
 pub(super) fn background<P: Profile>(scene: &Scene, carried: &Carried) -> Rgb {
-    if P::FLAT_MESHES {
-        return Rgb::ZERO;
-    }
-    carried.throughput * scene.emitters.background() * power_heuristic(carried.pdf, scene.emitters.background_pdf())
+    let Some((radiance, pdf)) = scene.emitters.surrounding::<P>() else { return Rgb::ZERO };
+    carried.throughput * radiance * power_heuristic(carried.pdf, pdf)
 }
 
 /// Radiance that the surface emits back along the edge that hit it.
@@ -116,8 +114,7 @@ pub(super) fn connection<P: Profile>(
     if !P::DIFFUSE && !surface.material.lobes().smooth {
         return None;
     }
-    let light: LightSample =
-        scene.emitters.sample::<P>(surface.p, surface.ng, decisions.light_place, decisions.light)?;
+    let light = scene.emitters.sample::<P>(surface.p, surface.ng, decisions.light_place, decisions.light)?;
     let Evaluation { value, pdf } = evaluate::<P>(surface.material, surface.wo, surface.frame.to_local(light.wi));
     let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
     (contribution != Rgb::ZERO).then_some(Connection {

@@ -143,13 +143,11 @@ impl Engine for TwoPassMlt {
     }
 
     fn develop(&self, stage: &Stage) -> Development {
-        let pending = stage.accumulator(1);
         let mut splats = Splats::new(1);
         for block in &self.blocks {
             block.chains.record_pending(self.unit(), &mut stage.recorder(&mut splats));
         }
-        pending.deposit(&mut splats);
-        let sums = layer_with(stage, &self.film, &pending, 0);
+        let sums = layer_with(&self.film, &splats, 0);
         let steps: u64 = self.blocks.iter().map(|b| b.chains.mutations()).sum();
         let scale = if steps > 0 { stage.pixels() as f64 / steps as f64 } else { 0.0 };
         Development {

@@ -93,12 +93,13 @@ pub trait Engine: Send {
     fn develop(&self, stage: &Stage) -> Development;
 }
 
-/// Σ rgb and Σ weight of every pixel of a layer, with splats added that are not in the accumulator.
-pub fn layer_with(stage: &Stage, film: &Accumulator, pending: &Accumulator, layer: usize) -> Vec<[f64; 4]> {
-    debug_assert_eq!(stage.pixels() as usize, film.layer(layer).len());
+/// Σ rgb and Σ weight of every pixel of a layer, with splats that are not on the film yet.
+pub fn layer_with(film: &Accumulator, pending: &Splats, layer: usize) -> Vec<[f64; 4]> {
     let mut sums = film.layer(layer);
-    for (sum, more) in sums.iter_mut().zip(pending.layer(layer)) {
-        sum.iter_mut().zip(more).for_each(|(s, m)| *s += m);
+    for splat in pending.layer(layer) {
+        let [r, g, b] = splat.rgb;
+        let sum = &mut sums[splat.pixel as usize];
+        sum.iter_mut().zip([r, g, b, splat.weight]).for_each(|(s, v)| *s += f64::from(v));
     }
     sums
 }

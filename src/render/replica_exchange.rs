@@ -111,7 +111,7 @@ impl ReplicaExchange {
         let recorded: Vec<&Statistics> = self.blocks.iter().map(|lane| lane.block.recorded()).collect();
         let ln_zeta = Pooled::solve(&self.ladder, &recorded).normalisers.ln_z;
         if self.sweeps == self.bootstrap {
-            let c = ln_zeta[ln_zeta.len() - 1].exp();
+            let c = libm::exp(ln_zeta[ln_zeta.len() - 1]);
             let brightest = f64::from(stage.mapping.scene().emitters.brightest());
             self.unit = if c > 0.0 && c.is_finite() { c } else { brightest };
             self.start_chains(stage);
@@ -206,9 +206,7 @@ impl Engine for ReplicaExchange {
         let statistics: Vec<Statistics> =
             self.blocks.iter().map(|lane| lane.block.with_pending(&self.weights, &mut recorder)).collect();
         let pooled = Pooled::solve(&self.ladder, &statistics.iter().collect::<Vec<_>>());
-        let pending = stage.accumulator(LAYERS);
-        pending.deposit(&mut splats);
-        let layer = |number: usize| layer_with(stage, &self.film, &pending, number);
+        let layer = |number: usize| layer_with(&self.film, &splats, number);
 
         let ladders = (self.plan.blocks * self.plan.groups) as f64;
         let pixels = stage.pixels() as f64;

@@ -19,7 +19,7 @@ impl StepLaw {
     /// Steps between `smallest` and `largest`, fractions of the unit interval, 2⁻³⁰ ≤ smallest ≤ largest ≤ 1/2.
     pub fn new(smallest: f32, largest: f32) -> StepLaw {
         assert!(2f32.powi(-30) <= smallest && smallest <= largest && largest <= 0.5);
-        StepLaw { largest_log2: -largest.log2(), span_log2: (largest / smallest).log2() }
+        StepLaw { largest_log2: -libm::log2f(largest), span_log2: libm::log2f(largest / smallest) }
     }
 
     /// Moves each dimension of `from` by a step of its own, each made from one random word.

@@ -1,7 +1,7 @@
 //! Proposed points, drawn block by block as paths reach them.
 
 use super::{Block, Points, StepLaw};
-use crate::rng::{Counter, Rng};
+use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
 
 /// How a lane's proposal comes about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,16 +59,27 @@ impl Proposals<'_> {
     #[inline]
     pub fn draw(&mut self, block: u16, lanes: &[u32]) {
         self.points.reserve(block);
-        for &lane in lanes {
-            let lane = lane as usize;
-            let words = self.rng.words(self.counters[lane], block);
-            let words = match self.moves[lane] {
-                Move::Small if block < self.current.used(lane) => self.law.step(self.current.block(block, lane), words),
-                Move::FreshAfterFirst if block == 0 => continue,
-                _ => words,
-            };
-            self.points.set(block, lane, words);
+        let (together, rest) = lanes.as_chunks::<SIDE_BY_SIDE>();
+        for lanes in together {
+            let words = self.rng.words_side_by_side(lanes.map(|lane| self.counters[lane as usize]), block);
+            for (j, &lane) in lanes.iter().enumerate() {
+                self.set(block, lane as usize, words.map(|w| w[j]));
+            }
         }
+        for &lane in rest {
+            self.set(block, lane as usize, self.rng.words(self.counters[lane as usize], block));
+        }
+    }
+
+    /// Makes the lane's block from four random words.
+    #[inline(always)]
+    fn set(&mut self, block: u16, lane: usize, words: [u32; 4]) {
+        let proposed = match self.moves[lane] {
+            Move::Small if block < self.current.used(lane) => self.law.step(self.current.block(block, lane), words),
+            Move::FreshAfterFirst if block == 0 => return,
+            _ => words,
+        };
+        self.points.set(block, lane, proposed);
     }
 
     /// Block `block` of a lane, drawn before.

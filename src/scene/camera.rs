@@ -29,7 +29,7 @@ impl Camera {
     /// The camera of that description, for a film of that shape.
     pub fn new(description: &CameraDescription, film: &FilmDescription) -> Camera {
         let aspect = f64::from(film.width) / f64::from(film.height);
-        let tangent = (0.5 * f64::from(description.fov).to_radians()).tan();
+        let tangent = libm::tan(0.5 * f64::from(description.fov).to_radians());
         // half width at distance 1, from the extent that the field of view spans
         let half_width = match description.fov_axis {
             FovAxis::X => tangent,

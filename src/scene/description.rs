@@ -128,3 +128,27 @@ pub enum Sides {
         back: u32,
     },
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// An empty scene with those lights.
+    pub fn with_lights(lights: Vec<Light>) -> SceneDescription {
+        SceneDescription {
+            integrator: Integrator { max_depth: None, rr_depth: 5 },
+            camera: CameraDescription {
+                to_world: Affine3A::IDENTITY,
+                fov: 45.0,
+                fov_axis: FovAxis::X,
+                near_clip: 0.01,
+                far_clip: 100.0,
+            },
+            film: FilmDescription { width: 1, height: 1, filter: Filter::Box },
+            materials: Vec::new(),
+            shapes: Vec::new(),
+            lights,
+            warnings: Vec::new(),
+        }
+    }
+}

@@ -14,7 +14,7 @@ mod surface;
 
 pub use camera::{Camera, Ray};
 pub use description::SceneDescription;
-pub use emitters::{Emitters, LightSample};
+pub use emitters::Emitters;
 pub use features::{DiffuseProfile, Features, FullProfile, Kernel, Profile};
 pub use mesh::Mesh;
 pub use surface::{NO_LIGHT, Surface};

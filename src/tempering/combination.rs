@@ -45,13 +45,13 @@ impl Weights {
         let ln_target = if known { ln_zeta[ln_zeta.len() - 1] } else { 0.0 };
         let ln_share: Vec<f64> = (0..ladder.rungs())
             .map(|k| match () {
-                () if k == 0 => counts[0].ln(),
-                () if known && ln_zeta[k].is_finite() => counts[k].ln() - ln_zeta[k],
+                () if k == 0 => libm::log(counts[0]),
+                () if known && ln_zeta[k].is_finite() => libm::log(counts[k]) - ln_zeta[k],
                 () => f64::NEG_INFINITY,
             })
             .collect();
         let scale = (0..ladder.rungs())
-            .map(|k| if ln_share[k].is_finite() { unit * counts[k] * (-ln_target).exp() } else { 0.0 })
+            .map(|k| if ln_share[k].is_finite() { unit * counts[k] * libm::exp(-ln_target) } else { 0.0 })
             .collect();
         Weights { combination, betas: ladder.betas().to_vec(), ln_share, scale, unit }
     }
@@ -61,7 +61,7 @@ impl Weights {
     pub fn uniform(&self, ln_g: f64) -> f64 {
         match self.combination {
             Combination::Target => 0.0,
-            Combination::Balance => libm::exp(self.ln_share[0] - self.ln_mixture(ln_g)),
+            Combination::Balance => self.over_mixture(self.ln_share[0], ln_g),
         }
     }
 
@@ -72,22 +72,18 @@ impl Weights {
         match self.combination {
             Combination::Target if k + 1 == self.betas.len() => self.unit * libm::exp(-ln_g),
             Combination::Target => 0.0,
-            Combination::Balance => self.scale[k] * libm::exp(-self.ln_mixture(ln_g)),
+            Combination::Balance => self.scale[k] * self.over_mixture(0.0, ln_g),
         }
     }
 
-    /// ln Σ_l (n_l/ζ_l) g^{β_l}.
+    /// e^`ln_numerator` / Σ_l (n_l/ζ_l) g^{β_l}.
     #[inline(always)]
-    fn ln_mixture(&self, ln_g: f64) -> f64 {
-        let mut largest = f64::NEG_INFINITY;
-        for (beta, share) in self.betas.iter().zip(&self.ln_share) {
-            largest = largest.max(share + beta * ln_g);
-        }
-        let mut sum = 0.0;
-        for (beta, share) in self.betas.iter().zip(&self.ln_share) {
-            sum += libm::exp(share + beta * ln_g - largest);
-        }
-        largest + libm::log(sum)
+    fn over_mixture(&self, ln_numerator: f64, ln_g: f64) -> f64 {
+        // shifting by the largest exponent keeps the sum within range for any g and ζ
+        let exponent = |l: usize| self.ln_share[l] + self.betas[l] * ln_g;
+        let largest = (0..self.betas.len()).map(exponent).fold(f64::NEG_INFINITY, f64::max);
+        let sum: f64 = (0..self.betas.len()).map(|l| libm::exp(exponent(l) - largest)).sum();
+        libm::exp(ln_numerator - largest) / sum
     }
 }
 

@@ -95,12 +95,13 @@ impl Normalisers {
         }
         let problem = Problem {
             betas: active.iter().map(|&k| betas[k]).collect(),
+            ln_counts: active.iter().map(|&k| libm::log(counts[k])).collect(),
             counts: active.iter().map(|&k| counts[k]).collect(),
         };
         let solution = problem.maximise(&bins);
         let ln_z: Vec<f64> = betas.iter().map(|&beta| problem.ln_z_at(beta, &bins, &solution)).collect();
         let relative_error = problem.relative_error(&bins, &solution, groups, &active, discount);
-        let c = ln_z[betas.len() - 1].exp();
+        let c = libm::exp(ln_z[betas.len() - 1]);
         Normalisers { ln_z, target: Estimate { value: c, standard_error: c * relative_error } }
     }
 }
@@ -109,6 +110,7 @@ impl Normalisers {
 struct Problem {
     betas: Vec<f64>,
     counts: Vec<f64>,
+    ln_counts: Vec<f64>,
 }
 
 impl Problem {
@@ -116,16 +118,16 @@ impl Problem {
     fn memberships(&self, v: f64, x: &[f64], p: &mut [f64]) -> f64 {
         let mut largest = f64::NEG_INFINITY;
         for (l, p) in p.iter_mut().enumerate() {
-            *p = if self.counts[l] > 0.0 { self.counts[l].ln() + self.betas[l] * v - x[l] } else { f64::NEG_INFINITY };
+            *p = self.ln_counts[l] + self.betas[l] * v - x[l];
             largest = largest.max(*p);
         }
         let mut sum = 0.0;
         for p in p.iter_mut() {
-            *p = (*p - largest).exp();
+            *p = libm::exp(*p - largest);
             sum += *p;
         }
         p.iter_mut().for_each(|p| *p /= sum);
-        largest + sum.ln()
+        largest + libm::log(sum)
     }
 
     /// ln Z at any β from the solved mixture: Σ_b H_b e^{βv_b}/Σ_m N_m e^{β_m v_b}/Ẑ_m; 0 at β = 0 by definition.
@@ -138,10 +140,10 @@ impl Problem {
             .values
             .iter()
             .zip(&bins.weights)
-            .map(|(&v, &w)| w.ln() + beta * v - self.memberships(v, x, &mut p))
+            .map(|(&v, &w)| libm::log(w) + beta * v - self.memberships(v, x, &mut p))
             .collect();
         let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        largest + terms.iter().map(|t| (t - largest).exp()).sum::<f64>().ln()
+        largest + libm::log(terms.iter().map(|t| libm::exp(t - largest)).sum())
     }
 
     /// Log-likelihood, up to a constant: −Σ_b H_b ln Σ_m N_m e^{β_m v_b − x_m} − Σ_l N_l x_l. Concave in x.

@@ -9,7 +9,7 @@ use crate::files::{Folder, around, mesh, scene_beside, scene_with, shape};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use relt::film::Filter;
 use relt::scene::description::{FovAxis, ShapeDescription, ShapeGeometry, Sides};
-use relt::scene::lights::Light;
+use relt::scene::lights::{Constant, Light, Point};
 use relt::scene::materials::Material;
 use relt::scene::{Mesh, SceneDescription};
 
@@ -197,9 +197,12 @@ fn lights_that_are_no_surfaces_are_listed() {
         <emitter type='point'><transform name='to_world'><translate y='4'/></transform></emitter>",
     );
     let position = |x, y, z| Vec3::new(x, y, z);
-    assert_eq!(scene.lights[0], Light::Point { position: position(1., 2., 3.), intensity: position(1., 2., 3.) });
-    assert_eq!(scene.lights[1], Light::Point { position: position(0., 4., 0.), intensity: Vec3::ONE });
-    assert_eq!(scene.lights[2], Light::Constant { radiance: Vec3::ONE });
+    assert_eq!(
+        scene.lights[0],
+        Light::Point(Point { position: position(1., 2., 3.), intensity: position(1., 2., 3.) })
+    );
+    assert_eq!(scene.lights[1], Light::Point(Point { position: position(0., 4., 0.), intensity: Vec3::ONE }));
+    assert_eq!(scene.lights[2], Light::Constant(Constant { radiance: Vec3::ONE }));
 }
 
 // ---- substitution and references

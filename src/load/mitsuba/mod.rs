@@ -90,7 +90,7 @@ fn lights(elements: &[&Element], faults: &Faults) -> Vec<Light> {
     let mut is_surrounded = false;
     for element in elements {
         let Some(light) = emitters::of_scene(element, faults) else { continue };
-        if matches!(light, Light::Constant { .. }) && std::mem::replace(&mut is_surrounded, true) {
+        if matches!(light, Light::Constant(_)) && std::mem::replace(&mut is_surrounded, true) {
             faults.at(&element.span, "the scene has more than one emitter that surrounds it");
         }
         lights.push(light);

@@ -1,0 +1,81 @@
+//! A triangle mesh that emits.
+
+use std::{f32::consts::PI, sync::Arc};
+
+use glam::Vec3;
+
+use super::{Emit, LightSample, per_solid_angle, towards};
+use crate::{
+    math::warp,
+    scene::{Mesh, Rgb},
+};
+
+/// The front of a mesh, uniform over its area.
+#[derive(Clone, Debug)]
+pub struct MeshLight {
+    mesh: Arc<Mesh>,
+    /// Upper ends of the triangles' shares of [0, 1], in proportion to area.
+    cumulative: Vec<f32>,
+    inverse_area: f32,
+    radiance: Rgb,
+}
+
+impl PartialEq for MeshLight {
+    fn eq(&self, other: &MeshLight) -> bool {
+        Arc::ptr_eq(&self.mesh, &other.mesh) && self.radiance == other.radiance
+    }
+}
+
+impl MeshLight {
+    /// The mesh as a light; it has some area.
+    pub fn new(mesh: Arc<Mesh>, radiance: Rgb) -> MeshLight {
+        let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
+        let total: f64 = areas.iter().sum();
+        let mut sum = 0.0;
+        let mut cumulative: Vec<f32> = areas
+            .iter()
+            .map(|area| {
+                sum += area / total;
+                sum as f32
+            })
+            .collect();
+        if let Some(last) = cumulative.last_mut() {
+            *last = 1.0;
+        }
+        MeshLight { mesh, cumulative, inverse_area: (1.0 / total) as f32, radiance }
+    }
+
+    /// A point and the normal there. The first number also chooses the triangle, so that near numbers give near
+    /// points of one triangle.
+    #[inline(always)]
+    fn point(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        let triangle = self.cumulative.partition_point(|&end| end <= u[0]).min(self.cumulative.len() - 1);
+        let start = if triangle == 0 { 0.0 } else { self.cumulative[triangle - 1] };
+        let within = ((u[0] - start) / (self.cumulative[triangle] - start)).clamp(0.0, 1.0);
+        let [b, c] = warp::triangle([within, u[1]]);
+        let [p0, p1, p2] = self.mesh.corners(triangle as u32);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        (p0 + e1 * b + e2 * c, e1.cross(e2).normalize())
+    }
+}
+
+impl Emit for MeshLight {
+    fn power(&self, _scene_radius: f32) -> Rgb {
+        self.radiance * (PI / self.inverse_area)
+    }
+
+    fn value(&self) -> Rgb {
+        self.radiance
+    }
+
+    #[inline(always)]
+    fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let (q, n) = self.point(u);
+        towards(p, ng, q, n, self.radiance, self.inverse_area)
+    }
+
+    #[inline(always)]
+    fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
+        per_solid_angle(self.inverse_area, origin, q, n)
+    }
+}

@@ -1,0 +1,56 @@
+//! A point.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::{Emit, LightSample, SHORT_OF_LIGHT, origin_towards};
+use crate::scene::{Rgb, parameters::Parameters};
+
+/// A point that shines equally in all directions. Parameters: `position` (default: the origin of `to_world`),
+/// `intensity`, W/sr, default 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Where it is, in world space.
+    pub position: Vec3,
+    /// Radiant intensity, W/sr per channel.
+    pub intensity: Rgb,
+}
+
+impl Point {
+    pub(super) fn read(p: &mut dyn Parameters) -> Point {
+        let position = p.point("position");
+        let origin = p.to_world().transform_point3(Vec3::ZERO);
+        Point { position: position.unwrap_or(origin), intensity: p.radiance("intensity", 1.0) }
+    }
+}
+
+impl Emit for Point {
+    fn power(&self, _scene_radius: f32) -> Rgb {
+        self.intensity * (4.0 * PI)
+    }
+
+    fn value(&self) -> Rgb {
+        self.intensity
+    }
+
+    #[inline(always)]
+    fn sample(&self, p: Vec3, ng: Vec3, _u: [f32; 2]) -> Option<LightSample> {
+        let origin = origin_towards(p, ng, self.position - p);
+        let to = self.position - origin;
+        let d2 = to.length_squared();
+        let distance = d2.sqrt();
+        (distance > 0.0).then(|| LightSample {
+            origin,
+            wi: to / distance,
+            tfar: distance * SHORT_OF_LIGHT,
+            weight: self.intensity / d2,
+            pdf: f32::INFINITY,
+        })
+    }
+
+    #[inline(always)]
+    fn pdf(&self, _origin: Vec3, _q: Vec3, _n: Vec3) -> f32 {
+        0.0
+    }
+}

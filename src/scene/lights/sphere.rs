@@ -1,0 +1,78 @@
+//! A sphere that emits.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::Vec3;
+
+use super::{Emit, LightSample, SHORT_OF_LIGHT, origin_towards, per_solid_angle, towards};
+use crate::{
+    math::{Frame, warp},
+    scene::Rgb,
+};
+
+/// A sphere that emits from its outside (from its inside, if flipped): uniform over the solid angle under which it is
+/// seen from outside, uniform over its area from inside. Source: Shirley, Wang & Zimmerman 1996, section 3.2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius, > 0.
+    pub radius: f32,
+    /// The front is the inside.
+    pub flipped: bool,
+    /// Radiance, W/(m² sr) per channel.
+    pub radiance: Rgb,
+}
+
+impl Sphere {
+    fn pdf_area(&self) -> f32 {
+        0.25 * warp::INV_PI / (self.radius * self.radius)
+    }
+
+    /// 1 − cos of the half angle under which it is seen from outside; `None` from inside. With sin² small the
+    /// difference is taken as sin²/(1 + cos), which keeps its digits.
+    #[inline(always)]
+    fn one_minus_cos(&self, origin: Vec3) -> Option<f32> {
+        let sin2 = self.radius * self.radius / (self.center - origin).length_squared();
+        (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    }
+}
+
+impl Emit for Sphere {
+    fn power(&self, _scene_radius: f32) -> Rgb {
+        self.radiance * (4.0 * PI * PI * self.radius * self.radius)
+    }
+
+    fn value(&self) -> Rgb {
+        self.radiance
+    }
+
+    #[inline(always)]
+    fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let origin = origin_towards(p, ng, self.center - p);
+        let Some(one_minus_cos) = self.one_minus_cos(origin) else {
+            let n = warp::sphere(u);
+            let front = if self.flipped { -n } else { n };
+            return towards(p, ng, self.center + n * self.radius, front, self.radiance, self.pdf_area());
+        };
+        if self.flipped {
+            return None; // the outside does not shine
+        }
+        let to = self.center - origin;
+        let wi = Frame::new(to.normalize()).to_world(warp::cone(u, one_minus_cos));
+        let along = to.dot(wi);
+        let half_chord = (self.radius * self.radius - (to - wi * along).length_squared()).max(0.0).sqrt();
+        let pdf = 1.0 / (TAU * one_minus_cos);
+        let tfar = (along - half_chord) * SHORT_OF_LIGHT;
+        // the cone may dip below the surface that the origin was moved off: such rays are absorbed by the surface
+        Some(LightSample { origin, wi, tfar, weight: self.radiance / pdf, pdf })
+    }
+
+    #[inline(always)]
+    fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
+        match self.one_minus_cos(origin) {
+            Some(one_minus_cos) => 1.0 / (TAU * one_minus_cos),
+            None => per_solid_angle(self.pdf_area(), origin, q, n),
+        }
+    }
+}
