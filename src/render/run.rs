@@ -99,7 +99,7 @@ fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderErr
     builder.build().map_err(|e| RenderError::Threads { threads, reason: e.to_string() })
 }
 
-fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
+pub(super) fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
     match settings.method {
         Method::Path => Box::new(PathTracer::new(stage, mutations)),
         Method::Mlt => Box::new(TwoPassMlt::new(stage, mutations)),

@@ -76,7 +76,7 @@ fn bodies_that_absorb_nothing_vanish_in_a_uniform_world() {
     let sphere = |bsdf: &str| format!("<shape type='sphere'><float name='radius' value='0.9'/>{bsdf}</shape>");
     let cube = |bsdf: &str| {
         format!(
-            "<shape type='cube'><transform name='to_world'><scale value='0.6'/><rotate x='1' y='2' angle='40'/></transform>
+            "<shape type='cube'><transform name='to_world'><scale value='0.6'/><rotate x='1' angle='40'/><rotate y='1' angle='25'/></transform>
                {bsdf}</shape>"
         )
     };

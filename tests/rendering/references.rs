@@ -26,11 +26,13 @@ fn methods() -> Vec<(&'static str, Settings)> {
 }
 
 /// All methods against the reference in `folder`. Tiles of a 64² picture are compared with those of the 256²
-/// reference, which with a box filter is exact: both are means over the same part of the film.
+/// reference, which with a box filter is exact: both are means over the same part of the film. The brightness of `mlt`
+/// is that of its first pass, 100,000 samples whatever follows, so it cannot be as precise as others'.
 fn check(name: &str, scene: &Scene, folder: &Path, precision: f64) {
     let expected = Expected::read(&folder.join("reference.exr"));
     for (method, settings) in methods() {
         let name = format!("reference-{name}-{method}");
+        let precision = if settings.method == Method::Mlt { 3.0 * precision } else { precision };
         Agreement { name: &name, tiles: [16, 16], precision }.check(&runs(scene, &settings, RUNS), &expected);
     }
 }
