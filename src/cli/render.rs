@@ -47,7 +47,7 @@ pub(super) struct Render {
     #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
     method: Method,
 
-    /// Replicas on a ladder for --method re, 2 to 1024, the uniform one included [default: 4]
+    /// Replicas on a ladder for --method re, 2 to 1024, the uniform one included [default: 3]
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Method")]
     replicas: Option<u32>,
 

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     chain::{Start, resample},
-    film::{Accumulator, Plane, Splats},
+    film::{Accumulator, Filter, Plane, Splats},
     path::unidirectional::Workspace,
     tempering::{
         Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, RungCounts, Statistics, Weights, layer,
@@ -25,8 +25,13 @@ use crate::{
     },
 };
 
-/// Uniform points that each ladder draws a sweep.
-const UNIFORM_DRAWS: usize = 1;
+/// Uniform points that a ladder draws a sweep: as many as it has replicas that move, so that half of all evaluations
+/// are uniform however long the ladder is. (ALGORITHM section 4: where little of the cube is lit, the error follows the
+/// number of lit uniform points.)
+fn uniform_draws(ladder: &Ladder) -> usize {
+    ladder.rungs() - 1
+}
+
 /// Independent samples from which chains start; a sixteenth of the run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
 /// Standard errors by which the uniform mean and MBAR may differ before the person is told.
@@ -74,9 +79,10 @@ impl ReplicaExchange {
     /// Ready to start.
     pub fn new(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> ReplicaExchange {
         let ladder = Arc::new(ladder(settings));
-        let plan = Plan::new(mutations, ladder.rungs() - 1 + UNIFORM_DRAWS);
+        let draws = uniform_draws(&ladder);
+        let plan = Plan::new(mutations, ladder.rungs() - 1 + draws);
         let block = |i: usize| Lane {
-            block: Block::new(ladder.clone(), stage.rng, (i * plan.groups) as u32, plan.groups, UNIFORM_DRAWS),
+            block: Block::new(ladder.clone(), stage.rng, (i * plan.groups) as u32, plan.groups, draws),
             splats: Splats::new(LAYERS),
         };
         let bootstrap = BOOTSTRAP.div_ceil(plan.a_sweep());
@@ -117,7 +123,7 @@ impl ReplicaExchange {
             self.start_chains(stage);
         }
         let mut counts = vec![1.0; self.ladder.rungs()];
-        counts[0] = UNIFORM_DRAWS as f64;
+        counts[0] = uniform_draws(&self.ladder) as f64;
         self.weights = Weights::new(self.combination, &self.ladder, &ln_zeta, &counts, self.unit);
     }
 
@@ -198,8 +204,8 @@ impl Engine for ReplicaExchange {
         counts
     }
 
-    /// Image = pixels · (Σ HOT / (sweeps · uniform points) + Ẑ/unit · Σ TEMPERED / sweeps), where sums over tempered
-    /// states are scaled up for the sweeps in which chains had no state yet.
+    /// Image = mean of HOT over each pixel's uniform points + pixels · Ẑ/unit · Σ TEMPERED / sweeps, where sums over
+    /// tempered states are scaled up for the sweeps in which chains had no state.
     fn develop(&self, stage: &Stage) -> Development {
         let mut splats = Splats::new(LAYERS);
         let mut recorder = stage.recorder(&mut splats);
@@ -208,22 +214,26 @@ impl Engine for ReplicaExchange {
         let pooled = Pooled::solve(&self.ladder, &statistics.iter().collect::<Vec<_>>());
         let layer = |number: usize| layer_with(&self.film, &splats, number);
 
-        let ladders = (self.plan.blocks * self.plan.groups) as f64;
-        let pixels = stage.pixels() as f64;
-        let inverse = |n: f64| if n > 0.0 { pixels / n } else { 0.0 };
-        let uniform_scale = inverse(statistics.iter().map(|s| s.uniform_points).sum::<u64>() as f64);
-        let hot_scale = inverse(self.sweeps.saturating_sub(self.bootstrap) as f64 * ladders * UNIFORM_DRAWS as f64);
         // one sample a sweep and rung was planned; `deposited` of them had a state and a share
         let deposited: f64 = statistics.iter().map(|s| s.deposited).sum();
         let used_rungs = match self.combination {
             Combination::Target => 1.0,
             Combination::Balance => (self.ladder.rungs() - 1) as f64,
         };
-        let tempered_scale = inverse(deposited) * used_rungs * pooled.normalisers.target.value / self.unit;
+        let a_state = if deposited > 0.0 { stage.pixels() as f64 * used_rungs / deposited } else { 0.0 };
+        let tempered_scale = a_state * pooled.normalisers.target.value / self.unit;
 
+        let draws = (self.plan.blocks * self.plan.groups * uniform_draws(&self.ladder)) as u64;
+        let in_rounds = self.sweeps.saturating_sub(self.bootstrap) * draws;
+        let in_all = statistics.iter().map(|s| s.uniform_points).sum::<u64>();
         let (uniform, hot, tempered) = (layer(layer::UNIFORM), layer(layer::HOT), layer(layer::TEMPERED));
-        let image = stage.image(|i| [0, 1, 2].map(|ch| hot[i][ch] * hot_scale + tempered[i][ch] * tempered_scale));
-        let uniform = stage.image(|i| [0, 1, 2].map(|ch| uniform[i][ch] * uniform_scale));
+        let hot_part = PixelMeans::new(stage, in_rounds);
+        let image = stage.image(|i| {
+            let hot = hot_part.of(&hot[i]);
+            [0, 1, 2].map(|ch| hot[ch] + tempered[i][ch] * tempered_scale)
+        });
+        let uniform_part = PixelMeans::new(stage, in_all);
+        let uniform = stage.image(|i| uniform_part.of(&uniform[i]));
         let density = hot.iter().zip(&tempered).map(|(h, t)| (h[3] + t[3]) as f32).collect();
         Development {
             image,
@@ -231,6 +241,31 @@ impl Engine for ReplicaExchange {
             normalisation: Some(pooled.normalisers.target),
             warnings: pooled.warnings(),
         }
+    }
+}
+
+/// Means over the uniform points of each pixel, of which the number is random.
+///
+/// Dividing by the number that a pixel got, rather than by the one it should have got, takes the noise of that number
+/// out of the image (post-stratification; on the Cornell box it is most of the noise of uniform points), without
+/// touching the points themselves, which must stay independent to be offered to chains. A pixel without any counts
+/// as 0; the others are scaled up for that, by the inverse of the probability of getting some, so that the estimate
+/// stays unbiased at any number of points. With a filter wider than a pixel the divisor is the sum of filter weights:
+/// consistent, as in Mitsuba.
+struct PixelMeans {
+    scale: f64,
+}
+
+impl PixelMeans {
+    fn new(stage: &Stage, points: u64) -> PixelMeans {
+        let box_filter = stage.mapping.scene().film.filter == Filter::Box;
+        // 1 − (1 − 1/pixels)^points
+        let some = -libm::expm1(points as f64 * libm::log1p(-1.0 / stage.pixels() as f64));
+        PixelMeans { scale: if box_filter && points > 0 && stage.pixels() > 1 { 1.0 / some } else { 1.0 } }
+    }
+
+    fn of(&self, &[r, g, b, weight]: &[f64; 4]) -> [f64; 3] {
+        if weight > 0.0 { [r, g, b].map(|v| v * self.scale / weight) } else { [0.0; 3] }
     }
 }
 

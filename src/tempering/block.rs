@@ -12,7 +12,7 @@ use crate::{
 
 /// Layers of the film that replica exchange fills.
 pub mod layer {
-    /// Plain mean of f over uniform points: the uniform replica's own estimate.
+    /// f of uniform points: the uniform replica's own estimate.
     pub const UNIFORM: usize = 0;
     /// What uniform points add to the image.
     pub const HOT: usize = 1;
@@ -200,13 +200,13 @@ impl<W: Default> Block<W> {
             let from = self.rung.len() + i;
             let point = self.evaluator.out.lanes[from];
             self.seen.uniform_point(&point, recorder);
+            if weights.use_uniform() {
+                let share = if point.is_dark() { 0.0 } else { weights.uniform(point.ln_g) };
+                recorder.splat(layer::HOT, &point, share, 1.0);
+            }
             if point.is_dark() {
                 self.counts[1].offered += 1;
                 continue;
-            }
-            let share = weights.uniform(point.ln_g);
-            if share > 0.0 {
-                recorder.splat(layer::HOT, &point, share, 1.0);
             }
             let ladder = i / self.uniform_draws;
             let lane = ladder * chains + usize::from(self.replica_on[ladder * chains]);
@@ -319,15 +319,13 @@ impl Statistics {
         }
     }
 
-    /// Records an independent sample, and draws it where it is lit.
+    /// Records an independent sample; the film counts dark ones too.
     #[inline(always)]
     fn uniform_point(&mut self, point: &Contribution, recorder: &mut Recorder) {
         self.uniform.add(point.ln_g, 1.0);
         self.uniform_points += 1;
-        if !point.is_dark() {
-            self.uniform_sum += point.g();
-            recorder.splat(layer::UNIFORM, point, 1.0, 1.0);
-        }
+        self.uniform_sum += point.g();
+        recorder.splat(layer::UNIFORM, point, 1.0, 1.0);
     }
 }
 

@@ -56,7 +56,12 @@ impl Weights {
         Weights { combination, betas: ladder.betas().to_vec(), ln_share, scale, unit }
     }
 
-    /// What a uniform point adds of its f: the share of the uniform rung.
+    /// Whether uniform points add anything.
+    pub fn use_uniform(&self) -> bool {
+        self.combination == Combination::Balance
+    }
+
+    /// What a uniform point adds of its f, where it is lit: the share of the uniform rung.
     #[inline(always)]
     pub fn uniform(&self, ln_g: f64) -> f64 {
         match self.combination {
