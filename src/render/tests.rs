@@ -68,11 +68,9 @@ fn a_run_gives_the_same_bits_however_it_is_sliced() {
         for (method, ladder) in [plain(Method::Path), plain(Method::Mlt), ladder(2), ladder(5)] {
             let settings = Settings { method, ladder, ..Settings::default() };
             let whole = run(&stage, &settings, &[u64::MAX], false);
-            for lengths in [&[1][..], &[7, 1, 40], &[64, 64, 3]] {
-                for watched in [false, true] {
-                    let sliced = run(&stage, &settings, lengths, watched);
-                    assert!(sliced == whole, "{name}, {method:?}: slices of {lengths:?}, watched: {watched}");
-                }
+            for (lengths, watched) in [(&[1][..], false), (&[7, 1, 40], true), (&[64, 64, 3], false)] {
+                let sliced = run(&stage, &settings, lengths, watched);
+                assert!(sliced == whole, "{name}, {method:?}: slices of {lengths:?}, watched: {watched}");
             }
         }
     }

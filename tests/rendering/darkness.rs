@@ -39,7 +39,7 @@ fn hidden_lamp() -> String {
         .into()
 }
 
-/// A lamp above a lid with a hole of 2 mm in a room 4 m wide.
+/// A lamp above a lid with a hole of 4 mm in a room 4 m wide.
 fn pinhole_lamp() -> String {
     let slab = |low: [f32; 2], high: [f32; 2]| {
         let middle = |i: usize| 0.5 * (low[i] + high[i]);
@@ -54,7 +54,7 @@ fn pinhole_lamp() -> String {
             middle(1)
         )
     };
-    let (edge, hole) = (2.0, 0.001);
+    let (edge, hole) = (2.0, 0.002);
     lamp("1000")
         + &slab([-edge, -edge], [-hole, edge])
         + &slab([hole, -edge], [edge, edge])
