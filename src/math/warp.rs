@@ -1,8 +1,7 @@
 //! Maps from the unit square to the domains of rendering, with density and inverse.
 //!
 //! Every map is measure-preserving up to its density and continuous almost everywhere, so a small step in the
-//! square stays a small step on the domain. To add one: a function triple and a line in `ALL`, which the tests
-//! iterate.
+//! square stays a small step on the domain.
 
 use glam::{Vec2, Vec3};
 

@@ -18,8 +18,10 @@ use crate::{
 
 /// Independent samples of the first pass; half of the budget where that is less.
 const BOOTSTRAP: u64 = 100_000;
-/// Samples evaluated together in the first pass.
+/// Samples evaluated together in the first pass, at most.
 const BOOTSTRAP_BATCH: u64 = 1024;
+/// Batches at least, where there are as many samples: the standard error of c is taken between them.
+const BOOTSTRAP_BATCHES: u64 = 16;
 
 /// The method at work.
 pub struct TwoPassMlt {
@@ -90,10 +92,11 @@ fn bootstrap_sample((sample, ln_g): (usize, &f64)) -> Start {
 }
 
 fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
-    (0..samples.div_ceil(BOOTSTRAP_BATCH))
+    let size = BOOTSTRAP_BATCH.min(samples.div_ceil(BOOTSTRAP_BATCHES));
+    (0..samples.div_ceil(size))
         .into_par_iter()
         .map(|batch| {
-            let samples = batch * BOOTSTRAP_BATCH..((batch + 1) * BOOTSTRAP_BATCH).min(samples);
+            let samples = batch * size..((batch + 1) * size).min(samples);
             let counters: Vec<Counter> = samples.map(bootstrap_counter).collect();
             let mut evaluator = Evaluator::<Workspace>::new(stage.rng, StepLaw::KELEMEN, counters);
             evaluator.moves.fill(Move::Fresh);

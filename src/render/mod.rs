@@ -12,6 +12,8 @@ mod replica_exchange;
 mod run;
 pub mod settings;
 pub mod status;
+#[cfg(test)]
+mod tests;
 
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};

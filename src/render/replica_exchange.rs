@@ -119,7 +119,8 @@ impl ReplicaExchange {
         if self.sweeps == self.bootstrap {
             let c = libm::exp(ln_zeta[ln_zeta.len() - 1]);
             let brightest = f64::from(stage.mapping.scene().emitters.brightest());
-            self.unit = if c > 0.0 && c.is_finite() { c } else { brightest };
+            // lights of radiance 0 leave no magnitude at all; any will do for a black film
+            self.unit = [c, brightest].into_iter().find(|unit| *unit > 0.0 && unit.is_finite()).unwrap_or(1.0);
             self.start_chains(stage);
         }
         let mut counts = vec![1.0; self.ladder.rungs()];

@@ -41,6 +41,17 @@ impl Mesh {
         self.triangles[t as usize].map(|i| self.positions[i as usize])
     }
 
+    /// Unit shading normal of triangle `t` at barycentric coordinates (1 − u − v, u, v); `flat`, its own normal, where
+    /// the mesh has none or they cancel.
+    #[inline(always)]
+    pub fn shading_normal(&self, t: u32, u: f32, v: f32, flat: Vec3) -> Vec3 {
+        if self.normals.is_empty() {
+            return flat;
+        }
+        let [a, b, c] = self.triangles[t as usize].map(|i| self.normals[i as usize]);
+        (a * (1.0 - u - v) + b * u + c * v).normalize_or(flat)
+    }
+
     /// Area of triangle `t`, in the square of the scene's unit, computed in f64.
     pub fn area(&self, t: u32) -> f64 {
         let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());

@@ -75,9 +75,7 @@ impl Scene {
             _ if P::FLAT_MESHES => unreachable!("a profile with flat meshes only"),
             Kind::Smooth(mesh) => {
                 let (p, ng) = flat(mesh, hit);
-                let [a, b, c] = mesh.triangles[hit.primitive as usize].map(|i| mesh.normals[i as usize]);
-                let ns = (a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v).normalize_or(ng);
-                (p, ng, ns)
+                (p, ng, mesh.shading_normal(hit.primitive, hit.u, hit.v, ng))
             }
             &Kind::Sphere { center, radius, flipped } => {
                 let outside = (origin + direction * hit.t - center).normalize();
@@ -86,8 +84,7 @@ impl Scene {
             }
             &Kind::Disk { normal } => (origin + direction * hit.t, normal, normal),
         };
-        let front = ng.dot(direction) < 0.0;
-        // Mitsuba decides the side of scattering by the shading normal and that of emission by the geometric one
+        // as in Mitsuba the shading normal decides the side, of scattering as of emission
         let back = ns.dot(direction) >= 0.0;
         let frame = Frame::new(if back && shape.two_sided { -ns } else { ns });
         Surface {
@@ -96,7 +93,7 @@ impl Scene {
             frame,
             wo: frame.to_local(-direction),
             material: &self.materials[shape.materials[usize::from(back)] as usize],
-            light: if front { shape.light } else { NO_LIGHT },
+            light: if back { NO_LIGHT } else { shape.light },
         }
     }
 }

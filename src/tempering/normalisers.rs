@@ -35,7 +35,7 @@ pub fn uniform_mean(groups: &[(f64, f64)]) -> Estimate {
 pub struct Normalisers {
     /// ln Ẑ_k, k from the uniform rung (0) to the target; −∞ for rungs that no state has reached.
     pub ln_z: Vec<f64>,
-    /// Ẑ of the target, c, with its standard error.
+    /// Ẑ of the target, c, with its standard error; 0 ± 0 as long as no uniform point met light.
     pub target: Estimate,
 }
 
@@ -67,8 +67,8 @@ impl Normalisers {
             .iter()
             .map(|&discount| Normalisers::discounted(ladder, groups, discount))
             .reduce(|best, other| {
-                let better = other.target.standard_error < best.target.standard_error;
-                if better { other } else { best }
+                let [error, least] = [&other, &best].map(|n| n.target.standard_error);
+                if error < least || least.is_nan() { other } else { best }
             })
             .expect("there are discounts")
     }
@@ -86,9 +86,11 @@ impl Normalisers {
         }
         let (values, weights) = pooled.lit().unzip();
         let bins = Bins { values, weights };
+        // chains may have met light where no uniform point has: then the likelihood grows for ever as Z falls
+        let is_lit = groups.iter().any(|group| group.uniform.lit().next().is_some());
         // rungs without weight have no equation; they are evaluated at the end from the others
         let active: Vec<usize> = (0..betas.len()).filter(|&k| k == 0 || counts[k] > 0.0).collect();
-        if bins.values.is_empty() {
+        if !is_lit {
             let mut ln_z = vec![f64::NEG_INFINITY; betas.len()];
             ln_z[0] = 0.0;
             return Normalisers { ln_z, target: Estimate { value: 0.0, standard_error: 0.0 } };
@@ -373,6 +375,17 @@ mod tests {
         let empty = Histogram::default();
         let group = Group { uniform: &dark, tempered: &empty, weights: &[0.0, 0.0] };
         let n = Normalisers::solve(&Ladder::even(2), &[group]);
+        assert_eq!(n.target, Estimate { value: 0.0, standard_error: 0.0 });
+    }
+
+    #[test]
+    fn light_that_only_chains_have_met_has_no_normaliser_yet() {
+        let (mut dark, mut met) = (Histogram::default(), Histogram::default());
+        dark.add(f64::NEG_INFINITY, 100.0);
+        met.add(2.0, 7.0);
+        met.add(3.0, 5.0);
+        let group = || Group { uniform: &dark, tempered: &met, weights: &[0.0, 12.0] };
+        let n = Normalisers::solve(&Ladder::even(2), &[group(), group()]);
         assert_eq!(n.target, Estimate { value: 0.0, standard_error: 0.0 });
     }
 

@@ -43,7 +43,7 @@ impl Emit for Disk {
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let d = warp::disk(u) * self.radius;
         let q = self.center + self.frame.s * d.x + self.frame.t * d.y;
-        towards(p, ng, q, self.frame.n, self.radiance, self.pdf_area())
+        towards(p, ng, q, [self.frame.n; 2], self.radiance, self.pdf_area())
     }
 
     #[inline(always)]

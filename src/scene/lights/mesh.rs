@@ -45,17 +45,18 @@ impl MeshLight {
         MeshLight { mesh, cumulative, inverse_area: (1.0 / total) as f32, radiance }
     }
 
-    /// A point and the normal there. The first number also chooses the triangle, so that near numbers give near
-    /// points of one triangle.
+    /// A point with the geometric and the shading normal there. The first number also chooses the triangle, so that
+    /// near numbers give near points of one triangle.
     #[inline(always)]
-    fn point(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    fn point(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2]) {
         let triangle = self.cumulative.partition_point(|&end| end <= u[0]).min(self.cumulative.len() - 1);
         let start = if triangle == 0 { 0.0 } else { self.cumulative[triangle - 1] };
         let within = ((u[0] - start) / (self.cumulative[triangle] - start)).clamp(0.0, 1.0);
         let [b, c] = warp::triangle([within, u[1]]);
         let [p0, p1, p2] = self.mesh.corners(triangle as u32);
         let (e1, e2) = (p1 - p0, p2 - p0);
-        (p0 + e1 * b + e2 * c, e1.cross(e2).normalize())
+        let n = e1.cross(e2).normalize();
+        (p0 + e1 * b + e2 * c, [n, self.mesh.shading_normal(triangle as u32, b, c, n)])
     }
 }
 
@@ -70,8 +71,8 @@ impl Emit for MeshLight {
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (q, n) = self.point(u);
-        towards(p, ng, q, n, self.radiance, self.inverse_area)
+        let (q, normals) = self.point(u);
+        towards(p, ng, q, normals, self.radiance, self.inverse_area)
     }
 
     #[inline(always)]

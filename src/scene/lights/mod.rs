@@ -146,16 +146,24 @@ impl Light {
     }
 }
 
-/// A sample towards the point `q` with normal `n` of a surface that emits `radiance`, chosen with density `pdf_area`.
+/// A sample towards the point `q` of a surface that emits `radiance`, chosen with density `pdf_area`. Of the surface's
+/// normals the shading one tells the side that shines, as for rays that hit it, and the geometric one the density.
 #[inline(always)]
-fn towards(p: Vec3, ng: Vec3, q: Vec3, n: Vec3, radiance: Rgb, pdf_area: f32) -> Option<LightSample> {
+fn towards(
+    p: Vec3,
+    ng: Vec3,
+    q: Vec3,
+    [geometric, shading]: [Vec3; 2],
+    radiance: Rgb,
+    pdf_area: f32,
+) -> Option<LightSample> {
     let origin = origin_towards(p, ng, q - p);
     let to = q - origin;
     let d2 = to.length_squared();
     let distance = d2.sqrt();
     let wi = to / distance;
-    let cos = -wi.dot(n);
-    if cos <= 0.0 || d2 <= 0.0 {
+    let cos = wi.dot(geometric).abs();
+    if wi.dot(shading) >= 0.0 || cos == 0.0 || d2 <= 0.0 {
         return None; // from behind
     }
     let pdf = pdf_area * d2 / cos;

@@ -49,22 +49,23 @@ impl Emit for Sphere {
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let origin = origin_towards(p, ng, self.center - p);
-        let Some(one_minus_cos) = self.one_minus_cos(origin) else {
+        let towards_center = origin_towards(p, ng, self.center - p);
+        let Some(one_minus_cos) = self.one_minus_cos(towards_center) else {
             let n = warp::sphere(u);
             let front = if self.flipped { -n } else { n };
-            return towards(p, ng, self.center + n * self.radius, front, self.radiance, self.pdf_area());
+            return towards(p, ng, self.center + n * self.radius, [front; 2], self.radiance, self.pdf_area());
         };
         if self.flipped {
             return None; // the outside does not shine
         }
+        let wi = Frame::new((self.center - towards_center).normalize()).to_world(warp::cone(u, one_minus_cos));
+        // where the surface cuts the sphere the cone reaches to both of its sides: the ray starts on that of `wi`
+        let origin = origin_towards(p, ng, wi);
         let to = self.center - origin;
-        let wi = Frame::new(to.normalize()).to_world(warp::cone(u, one_minus_cos));
         let along = to.dot(wi);
         let half_chord = (self.radius * self.radius - (to - wi * along).length_squared()).max(0.0).sqrt();
         let pdf = 1.0 / (TAU * one_minus_cos);
         let tfar = (along - half_chord) * SHORT_OF_LIGHT;
-        // the cone may dip below the surface that the origin was moved off: such rays are absorbed by the surface
         Some(LightSample { origin, wi, tfar, weight: self.radiance / pdf, pdf })
     }
 

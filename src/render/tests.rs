@@ -1,0 +1,77 @@
+//! Engines do not notice how their sweeps are cut into slices.
+
+use std::path::Path;
+
+use super::{
+    LadderChoice, Method, Settings,
+    engine::{Counts, Engine, Stage},
+    run::engine,
+};
+use crate::{
+    embree::{Device, Width},
+    film::{Footprint, Plane},
+    path::unidirectional::{Mapping, Widths},
+    rng::Rng,
+    scene::Scene,
+};
+
+const MUTATIONS: u64 = 40_000;
+
+/// Everything that can be seen of an engine, as bits.
+fn bits(engine: &dyn Engine, stage: &Stage) -> Vec<u64> {
+    let development = engine.develop(stage);
+    let mut planes = vec![development.image.pixels.as_flattened().to_vec()];
+    planes.extend(development.layers.into_iter().map(|(_, plane)| match plane {
+        Plane::Rgb(image) => image.pixels.into_flattened(),
+        Plane::Gray(values) => values,
+    }));
+    let Counts { mutations, rays, non_finite, acceptance, swap } = engine.counts();
+    let estimate = development.normalisation.expect("every method has one");
+    let numbers = [&acceptance[..], &swap[..], &[estimate.value, estimate.standard_error]].concat();
+    let words = planes.concat().into_iter().map(|v| u64::from(v.to_bits())).chain([mutations, rays, non_finite]);
+    words.chain(numbers.into_iter().map(f64::to_bits)).collect()
+}
+
+/// Slices of lengths from `lengths`, over and over until all sweeps are done; a picture after each where `watched`.
+fn run(stage: &Stage, settings: &Settings, lengths: &[u64], watched: bool) -> Vec<u64> {
+    let mut engine = engine(stage, settings, Some(MUTATIONS));
+    let wanted = engine.sweeps_wanted().expect("a limited run");
+    let mut done = 0;
+    for length in lengths.iter().cycle() {
+        let sweeps = (*length).min(wanted - done);
+        if sweeps == 0 {
+            break;
+        }
+        engine.advance(stage, sweeps);
+        done += sweeps;
+        if watched {
+            engine.develop(stage);
+        }
+    }
+    bits(engine.as_ref(), stage)
+}
+
+#[test]
+fn a_run_gives_the_same_bits_however_it_is_sliced() {
+    let device = Device::new("").unwrap();
+    for name in ["cornell-box", "caustic", "lattice"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
+        let scene = Scene::new(&device, crate::load::scene(&path, &[("res".into(), "24".into())]).unwrap()).unwrap();
+        let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
+        let stage = Stage {
+            mapping: Mapping::new(&scene, widths),
+            footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
+            rng: Rng::new(9),
+        };
+        let ladder = |k| (Method::ReplicaExchange, LadderChoice::Replicas(k));
+        let plain = |method| (method, LadderChoice::default());
+        for (method, ladder) in [plain(Method::Path), plain(Method::Mlt), ladder(2), ladder(5)] {
+            let settings = Settings { method, ladder, ..Settings::default() };
+            let whole = run(&stage, &settings, &[u64::MAX], false);
+            for (lengths, watched) in [(&[1][..], false), (&[7, 1, 40], true), (&[64, 64, 3], false)] {
+                let sliced = run(&stage, &settings, lengths, watched);
+                assert!(sliced == whole, "{name}, {method:?}: slices of {lengths:?}, watched: {watched}");
+            }
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Whole pictures, from scene file to image, against what is known of them.
+//!
+//! [`mapping`] batch against scalar; [`furnace`] scenes whose image is a formula; [`references`] scenes rendered by
+//! another program to little noise; [`mitsuba`] small scenes with one feature each, the same; [`bits`] what must not
+//! change a bit; [`darkness`] scenes without light, with hardly any and with too much.
+//!
+//! Statistical tests compare means over independent runs (samples of one chain correlate, runs do not), state their
+//! level, and leave the table and images of a failure under `target/test-evidence/NAME`.
+
+mod bits;
+mod darkness;
+mod furnace;
+mod mapping;
+mod mitsuba;
+mod references;
+mod support;

@@ -1,0 +1,139 @@
+//! The batched mapping against the scalar one, to the bit.
+
+use relt::chain::Evaluator;
+use relt::embree::Width;
+use relt::path::unidirectional::{Mapping, Workspace};
+use relt::path::{Contribution, Layout, scalar};
+use relt::rng::{Counter, Purpose, Rng};
+use relt::sample::{Move, Points, Proposals, StepLaw};
+use relt::scene::{DiffuseProfile, FullProfile, Kernel, Profile, Scene};
+
+use crate::support::{OWN, fixed_widths, load, own, repository};
+
+/// No multiple of any packet width.
+const LANES: usize = 61;
+const STEPS: u64 = 60;
+
+/// Steps large enough that paths change their length.
+fn law() -> StepLaw {
+    StepLaw::new(1.0 / 1024.0, 1.0 / 8.0)
+}
+
+/// Fresh points at first, then small steps from the last lit point, fresh points, ones with a given film position
+/// and rest, in an order that differs from lane to lane.
+fn moves(step: u64) -> Vec<Move> {
+    let of_lane = |lane: u64| match (step + lane) % 8 {
+        _ if step == 0 => Move::Fresh,
+        0 => Move::Rest,
+        1 => Move::Fresh,
+        2 => Move::FreshAfterFirst,
+        _ => Move::Small,
+    };
+    (0..LANES as u64).map(of_lane).collect()
+}
+
+fn counters(step: u64) -> Vec<Counter> {
+    (0..LANES).map(|lane| Counter { ladder: lane as u32, replica: 3, step, purpose: Purpose::Primary }).collect()
+}
+
+/// Film positions given from outside, for [`Move::FreshAfterFirst`].
+fn place_first_blocks(points: &mut Points, moves: &[Move], step: u64) {
+    points.reserve(0);
+    for (lane, _) in moves.iter().enumerate().filter(|(_, m)| **m == Move::FreshAfterFirst) {
+        let word = (step as u32).wrapping_mul(0x9E37_79B9).wrapping_add((lane as u32).wrapping_mul(0x85EB_CA6B));
+        points.set(0, lane, [word, word.rotate_left(16), 0, 0]);
+    }
+}
+
+fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
+    (c.film.map(f32::to_bits), c.rgb.to_array().map(f32::to_bits), c.ln_g.to_bits())
+}
+
+/// All contributions and points that `STEPS` steps of the batch give, each compared with the scalar mapping.
+fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) -> Vec<Contribution> {
+    let mapping = Mapping::with_kernel(scene, fixed_widths(width), kernel);
+    let layout = Layout::new(&scene.features);
+    let rng = Rng::new(7);
+    let mut evaluator = Evaluator::<Workspace>::new(rng, law(), counters(0));
+    let mut current = Points::new(LANES);
+    let mut all = Vec::new();
+    let mut faults = 0;
+    for step in 0..STEPS {
+        let moves = moves(step);
+        evaluator.counters = counters(step);
+        evaluator.moves = moves.clone();
+        place_first_blocks(&mut evaluator.points, &moves, step);
+        let before = evaluator.out.lanes.clone();
+        evaluator.evaluate(&mapping, &current);
+
+        let mut points = Points::new(LANES);
+        place_first_blocks(&mut points, &moves, step);
+        let counters = counters(step);
+        let mut proposals =
+            Proposals { rng, current: &current, points: &mut points, counters: &counters, moves: &moves, law: law() };
+        let mut live = Vec::new();
+        proposals.begin(&mut live);
+        for lane in (0..LANES).filter(|lane| moves[*lane] == Move::Rest) {
+            assert_eq!(evaluator.out.lanes[lane], before[lane], "{name}: lane {lane} rests in step {step}");
+        }
+        let mut lit = Vec::new();
+        for lane in live.into_iter().map(|lane| lane as usize) {
+            let replay = format!("{name}, {kernel:?} kernel, width {width}, step {step}, lane {lane}");
+            let (expected, fault) = scalar::evaluate::<P>(scene, &layout, &mut proposals, lane);
+            let got = evaluator.out.lanes[lane];
+            assert_eq!(bits(&got), bits(&expected), "{replay}: {got:?} for {expected:?}");
+            faults += u64::from(fault);
+            let used = proposals.points.used(lane);
+            assert_eq!(evaluator.points.used(lane), used, "{replay}: blocks");
+            for block in 0..used {
+                assert_eq!(evaluator.points.block(block, lane), proposals.block(block, lane), "{replay}: {block}");
+            }
+            all.push(got);
+            if !got.is_dark() {
+                lit.push(lane);
+            }
+        }
+        for lane in lit {
+            current.copy(lane, &points, lane);
+        }
+    }
+    assert_eq!(evaluator.out.non_finite, faults, "{name}: faults");
+    all
+}
+
+fn every_width<P: Profile>(name: &str, scene: &Scene, kernel: Kernel) -> Vec<Contribution> {
+    let mut of_widths = Width::ALL.map(|width| compare::<P>(name, scene, kernel, width)).into_iter();
+    let first = of_widths.next().expect("there are widths");
+    for other in of_widths {
+        assert!(first.iter().zip(&other).all(|(a, b)| bits(a) == bits(b)), "{name}: widths differ");
+    }
+    let lit = first.iter().filter(|c| !c.is_dark()).count();
+    assert!(lit >= 80, "{name}: only {lit} of {} points are lit, which says little", first.len());
+    first
+}
+
+#[test]
+fn every_lane_of_a_batch_is_what_the_scalar_mapping_says() {
+    for name in OWN {
+        let scene = own(name, &[("res", "64")]);
+        let full = every_width::<FullProfile>(name, &scene, Kernel::Full);
+        if scene.features.kernel() == Kernel::Diffuse {
+            let diffuse = every_width::<DiffuseProfile>(name, &scene, Kernel::Diffuse);
+            assert!(full.iter().zip(&diffuse).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
+        }
+    }
+}
+
+#[test]
+fn batch_and_scalar_agree_where_a_scene_has_everything() {
+    for name in ["everything", "roulette", "roulette-late", "smooth", "smooth-emitter-light", "sphere-light"] {
+        let scene = load(&repository("tests/mitsuba").join(name).with_extension("xml"), &[]);
+        every_width::<FullProfile>(name, &scene, Kernel::Full);
+    }
+}
+
+#[test]
+fn the_small_kernel_is_chosen_where_it_is_enough() {
+    let kernels = OWN.map(|name| own(name, &[]).features.kernel());
+    assert_eq!(kernels, [Kernel::Diffuse, Kernel::Full, Kernel::Diffuse], "{OWN:?}");
+}

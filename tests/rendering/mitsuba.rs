@@ -1,0 +1,56 @@
+//! Small scenes with one feature each against Mitsuba 3: `tests/mitsuba/NAME.xml` and what `compare.py` there made of
+//! it. Materials, lights, shapes, filters, camera and roulette by somebody else's hand.
+
+use relt::render::Method;
+
+use crate::support::{Agreement, Expected, load, repository, runs, settings};
+
+fn check(names: &[&str]) {
+    for name in names {
+        let folder = repository("tests/mitsuba");
+        let scene = load(&folder.join(name).with_extension("xml"), &[]);
+        let expected = Expected::read(&folder.join(name).with_extension("exr"));
+        let runs = runs(&scene, &settings(Method::Path, 1024.0, 0), 8);
+        Agreement { name: &format!("mitsuba-{name}"), tiles: [24, 16], precision: 0.01 }.check(&runs, &expected);
+    }
+}
+
+#[test]
+fn materials_are_what_mitsuba_makes_of_them() {
+    check(&["gold", "glass", "twosided"]);
+}
+
+#[test]
+fn lights_are_what_mitsuba_makes_of_them() {
+    check(&["point", "constant", "sphere-light", "disk-light"]);
+}
+
+#[test]
+fn shapes_are_what_mitsuba_makes_of_them() {
+    check(&["smooth", "flipped"]);
+}
+
+#[test]
+fn meshes_with_shading_normals_shine_where_mitsubas_do() {
+    check(&["smooth-emitter", "smooth-emitter-light"]);
+}
+
+#[test]
+fn the_camera_sees_what_mitsubas_sees() {
+    check(&["fov-y", "fov-diagonal", "fov-smaller", "fov-larger", "focal-length", "clip"]);
+}
+
+#[test]
+fn filters_spread_as_mitsubas_do() {
+    check(&["gaussian", "tent"]);
+}
+
+#[test]
+fn roulette_begins_where_mitsubas_does_and_changes_no_brightness() {
+    check(&["roulette", "roulette-late"]);
+}
+
+#[test]
+fn a_scene_with_everything_is_what_mitsuba_makes_of_it() {
+    check(&["everything"]);
+}
