@@ -110,7 +110,11 @@ impl Agreement<'_> {
     /// Means of tiles, channels innermost.
     fn tile_means(&self, image: &Image) -> Vec<f64> {
         let [columns, rows] = self.tiles;
-        assert!(image.width % columns == 0 && image.height % rows == 0, "{}: tiles do not fit", self.name);
+        assert!(
+            image.width.is_multiple_of(columns) && image.height.is_multiple_of(rows),
+            "{}: tiles do not fit",
+            self.name
+        );
         let (width, height) = (image.width / columns, image.height / rows);
         let mut sums = vec![0.0; (columns * rows * 3) as usize];
         for (i, rgb) in image.pixels.iter().enumerate() {
