@@ -144,7 +144,7 @@ fn help_tells_exit_codes_defaults_and_units() {
     let output = relt(folder.path(), &["render", "--help"]);
     assert_eq!(output.status.code(), Some(0));
     let text = String::from_utf8(output.stdout).unwrap();
-    for part in ["Exit codes:", "[default: 4]", "[possible values: path, mlt, re]", "60s", "130"] {
+    for part in ["Exit codes:", "[default: 3]", "[possible values: path, mlt, re]", "60s", "130"] {
         assert!(text.contains(part), "{part:?} is not in:\n{text}");
     }
     assert_eq!(relt(folder.path(), &["--version"]).status.code(), Some(0));

@@ -228,7 +228,7 @@ mod tests {
 
     use super::*;
     use crate::film::Image;
-    use crate::render::settings::Settings;
+    use crate::render::settings::{LadderChoice, Settings};
 
     /// A file in memory that can be looked into.
     #[derive(Clone, Default)]
@@ -266,7 +266,12 @@ mod tests {
     fn a_run_reads_back() {
         let file = Shared::default();
         let log = Log::new(file.clone());
-        let settings = Settings { seed: 5, time: Some(Duration::from_secs(90)), ..Settings::default() };
+        let settings = Settings {
+            seed: 5,
+            time: Some(Duration::from_secs(90)),
+            ladder: LadderChoice::Replicas(4),
+            ..Settings::default()
+        };
         log.started(&RunStart {
             scene: "scenes/tür/scene.xml".into(),
             settings,

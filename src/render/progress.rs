@@ -111,7 +111,7 @@ impl Observer for Progress {
     }
 }
 
-/// `scenes/door/scene.xml: 256 × 256, replica exchange, 4 replicas, 64 mutations per pixel, 2 threads`
+/// `scenes/door/scene.xml: 256 × 256, replica exchange with 4 replicas, 64 mutations per pixel, 2 threads`
 pub fn heading(start: &RunStart) -> String {
     let settings = &start.settings;
     let mut words = vec![format!("{}: {} × {}", start.scene, start.width, start.height)];
@@ -278,7 +278,11 @@ mod tests {
             width: 4,
             height: 3,
             threads: 2,
-            settings: Settings { time: Some(Duration::from_secs(90)), ..Settings::default() },
+            settings: Settings {
+                ladder: LadderChoice::Replicas(4),
+                time: Some(Duration::from_secs(90)),
+                ..Settings::default()
+            },
             ..RunStart::default()
         });
         for step in 0..=1000 {
