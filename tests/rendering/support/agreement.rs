@@ -7,8 +7,8 @@ use relt::film::{Image, Plane, exr_file, png_file};
 
 use super::statistics::{f_test, mean, t_test, variance};
 
-/// Probability with which one check fails although all is right. Some 250 checks are made altogether, each of an
-/// image and of three or four means: a false alarm in eight suites of a thousand changes of all random numbers.
+/// Probability with which one test fails although all is right. Some 110 sets of runs are checked, each by one F-test
+/// and four t-tests: a false alarm in fewer than six of a thousand changes of all random numbers.
 const LEVEL: f64 = 1e-5;
 /// Relative error of values that are exact but for rounding to 32 bits along the way.
 const ROUNDING: f64 = 3e-6;
