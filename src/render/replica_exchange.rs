@@ -51,7 +51,7 @@ pub struct ReplicaExchange {
     ladder: Arc<Ladder>,
     combination: Combination,
     film: Accumulator,
-    blocks: Vec<Lane>,
+    portions: Vec<Portion>,
     sweeps: u64,
     /// How many of the sweeps are uniform points only.
     bootstrap: u64,
@@ -63,8 +63,8 @@ pub struct ReplicaExchange {
     unit: f64,
 }
 
-/// A block with its splats.
-struct Lane {
+/// A block of ladders with its splats.
+struct Portion {
     block: Block<Workspace>,
     splats: Splats,
 }
@@ -81,7 +81,7 @@ impl ReplicaExchange {
         let ladder = Arc::new(ladder(settings));
         let draws = uniform_draws(&ladder);
         let plan = Plan::new(mutations, ladder.rungs() - 1 + draws);
-        let block = |i: usize| Lane {
+        let portion = |i: usize| Portion {
             block: Block::new(ladder.clone(), stage.rng, (i * plan.groups) as u32, plan.groups, draws),
             splats: Splats::new(LAYERS),
         };
@@ -95,7 +95,7 @@ impl ReplicaExchange {
         let counts = vec![1.0; ladder.rungs()];
         ReplicaExchange {
             film: stage.accumulator(LAYERS),
-            blocks: (0..plan.blocks).map(block).collect(),
+            portions: (0..plan.blocks).map(portion).collect(),
             combination,
             sweeps: 0,
             bootstrap,
@@ -110,11 +110,11 @@ impl ReplicaExchange {
     /// Ends the round at work and fixes the weights of the next; the first time, chains start.
     fn begin_round(&mut self, stage: &Stage) {
         let (film, weights) = (&self.film, &self.weights);
-        self.blocks.par_iter_mut().for_each(|lane| {
-            lane.block.flush(weights, &mut stage.recorder(&mut lane.splats));
-            film.deposit(&mut lane.splats);
+        self.portions.par_iter_mut().for_each(|portion| {
+            portion.block.flush(weights, &mut stage.recorder(&mut portion.splats));
+            film.deposit(&mut portion.splats);
         });
-        let recorded: Vec<&Statistics> = self.blocks.iter().map(|lane| lane.block.recorded()).collect();
+        let recorded: Vec<&Statistics> = self.portions.iter().map(|portion| portion.block.recorded()).collect();
         let ln_zeta = Pooled::solve(&self.ladder, &recorded).normalisers.ln_z;
         if self.sweeps == self.bootstrap {
             let c = libm::exp(ln_zeta[ln_zeta.len() - 1]);
@@ -130,7 +130,7 @@ impl ReplicaExchange {
 
     /// Resamples the bootstrap for every rung and puts the chains there.
     fn start_chains(&mut self, stage: &Stage) {
-        let samples: Vec<Start> = self.blocks.iter_mut().flat_map(|lane| lane.block.take_bootstrap()).collect();
+        let samples: Vec<Start> = self.portions.iter_mut().flat_map(|portion| portion.block.take_bootstrap()).collect();
         let ladders = self.plan.blocks * self.plan.groups;
         let starts: Vec<Vec<Start>> = self.ladder.betas()[1..]
             .par_iter()
@@ -138,11 +138,11 @@ impl ReplicaExchange {
             .map(|(rung, &beta)| resample(&samples, beta, ladders, stage.rng, rung as u32))
             .collect();
         let groups = self.plan.groups;
-        self.blocks.par_iter_mut().enumerate().for_each(|(i, lane)| {
+        self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let of_block = i * groups..(i + 1) * groups;
             let starts: Vec<&[Start]> =
                 starts.iter().map(|rung| rung.get(of_block.clone()).unwrap_or_default()).collect();
-            lane.block.start(&stage.mapping, &starts);
+            portion.block.start(&stage.mapping, &starts);
         });
     }
 }
@@ -177,14 +177,14 @@ impl Engine for ReplicaExchange {
             let sweeps = self.next_round.min(end) - self.sweeps;
             let chains_move = self.sweeps >= self.bootstrap;
             let (film, weights) = (&self.film, &self.weights);
-            self.blocks.par_iter_mut().for_each(|lane| {
-                let mut recorder = stage.recorder(&mut lane.splats);
+            self.portions.par_iter_mut().for_each(|portion| {
+                let mut recorder = stage.recorder(&mut portion.splats);
                 if chains_move {
-                    lane.block.advance(&stage.mapping, sweeps, weights, &mut recorder);
+                    portion.block.advance(&stage.mapping, sweeps, weights, &mut recorder);
                 } else {
-                    lane.block.bootstrap(&stage.mapping, sweeps, &mut recorder);
+                    portion.block.bootstrap(&stage.mapping, sweeps, &mut recorder);
                 }
-                film.deposit(&mut lane.splats);
+                film.deposit(&mut portion.splats);
             });
             self.sweeps += sweeps;
         }
@@ -193,12 +193,12 @@ impl Engine for ReplicaExchange {
     fn counts(&self) -> Counts {
         let mut counts = Counts::default();
         let mut rungs = vec![RungCounts::default(); self.ladder.rungs()];
-        for lane in &self.blocks {
-            let (rays, faults) = lane.block.rays_and_faults();
-            counts.mutations += lane.block.mutations();
+        for portion in &self.portions {
+            let (rays, faults) = portion.block.rays_and_faults();
+            counts.mutations += portion.block.mutations();
             counts.rays += rays;
             counts.non_finite += faults;
-            rungs.iter_mut().zip(lane.block.counts()).for_each(|(sum, c)| *sum += *c);
+            rungs.iter_mut().zip(portion.block.counts()).for_each(|(sum, c)| *sum += *c);
         }
         counts.acceptance = rungs[1..].iter().map(|c| mean(c.accepted, c.proposed)).collect();
         counts.swap = rungs[1..].iter().map(|c| mean(c.swapped, c.offered)).collect();
@@ -211,7 +211,7 @@ impl Engine for ReplicaExchange {
         let mut splats = Splats::new(LAYERS);
         let mut recorder = stage.recorder(&mut splats);
         let statistics: Vec<Statistics> =
-            self.blocks.iter().map(|lane| lane.block.with_pending(&self.weights, &mut recorder)).collect();
+            self.portions.iter().map(|portion| portion.block.with_pending(&self.weights, &mut recorder)).collect();
         let pooled = Pooled::solve(&self.ladder, &statistics.iter().collect::<Vec<_>>());
         let layer = |number: usize| layer_with(&self.film, &splats, number);
 
@@ -227,15 +227,20 @@ impl Engine for ReplicaExchange {
         let draws = (self.plan.blocks * self.plan.groups * uniform_draws(&self.ladder)) as u64;
         let in_rounds = self.sweeps.saturating_sub(self.bootstrap) * draws;
         let in_all = statistics.iter().map(|s| s.uniform_points).sum::<u64>();
-        let (uniform, hot, tempered) = (layer(layer::UNIFORM), layer(layer::HOT), layer(layer::TEMPERED));
-        let hot_part = PixelMeans::new(stage, in_rounds);
-        let image = stage.image(|i| {
+        let (uniform_sums, hot, tempered) = (layer(layer::UNIFORM), layer(layer::HOT), layer(layer::TEMPERED));
+        let (uniform_part, hot_part) = (PixelMeans::new(stage, in_all), PixelMeans::new(stage, in_rounds));
+        let uniform = stage.image(|i| uniform_part.of(&uniform_sums[i]));
+        let combined = |i: usize| {
             let hot = hot_part.of(&hot[i]);
             [0, 1, 2].map(|ch| hot[ch] + tempered[i][ch] * tempered_scale)
-        });
-        let uniform_part = PixelMeans::new(stage, in_all);
-        let uniform = stage.image(|i| uniform_part.of(&uniform[i]));
-        let density = hot.iter().zip(&tempered).map(|(h, t)| (h[3] + t[3]) as f32).collect();
+        };
+        let combined_density = |(h, t): (&[f64; 4], &[f64; 4])| (h[3] + t[3]) as f32;
+        // before the first round there is nothing but the uniform replica's own estimate
+        let (image, density) = if in_rounds == 0 {
+            (uniform.clone(), uniform_sums.iter().map(|sum| sum[3] as f32).collect())
+        } else {
+            (stage.image(combined), hot.iter().zip(&tempered).map(combined_density).collect())
+        };
         Development {
             image,
             layers: vec![("uniform".into(), Plane::Rgb(uniform)), ("density".into(), Plane::Gray(density))],

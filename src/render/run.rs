@@ -178,10 +178,9 @@ fn conclude(
     let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
     let mut warnings = development.warnings;
     if development.image.pixels.iter().flatten().all(|v| *v == 0.0) {
-        warnings.push(format!(
-            "the image is black: none of {} paths met light; is a light in reach of what the camera sees?",
-            status.mutations
-        ));
+        warnings.push(
+            "the image is black: no independent path met light; is a light in reach of what the camera sees?".into(),
+        );
     }
     if status.non_finite > 0 {
         warnings.push(format!(

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     LadderChoice, Method, Settings,
-    engine::{Counts, Engine, Stage},
+    engine::{Counts, Development, Engine, Stage},
     run::engine,
 };
 use crate::{
@@ -51,18 +51,37 @@ fn run(stage: &Stage, settings: &Settings, lengths: &[u64], watched: bool) -> Ve
     bits(engine.as_ref(), stage)
 }
 
+fn scene(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
+    let description = crate::load::scene(&path, &[("res".into(), "24".into())]).unwrap();
+    Scene::new(&Device::new("").unwrap(), description).unwrap()
+}
+
+fn stage(scene: &Scene) -> Stage<'_> {
+    let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
+    Stage {
+        mapping: Mapping::new(scene, widths),
+        footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
+        rng: Rng::new(9),
+    }
+}
+
+#[test]
+fn before_chains_move_the_picture_is_that_of_the_uniform_replica() {
+    let scene = scene("cornell-box");
+    let stage = stage(&scene);
+    let mut engine = engine(&stage, &Settings::default(), Some(MUTATIONS));
+    engine.advance(&stage, 1);
+    let Development { image, layers, .. } = engine.develop(&stage);
+    assert!(image.mean().iter().all(|channel| *channel > 0.01), "{:?}", image.mean());
+    assert_eq!(layers[0], ("uniform".to_owned(), Plane::Rgb(image)));
+}
+
 #[test]
 fn a_run_gives_the_same_bits_however_it_is_sliced() {
-    let device = Device::new("").unwrap();
     for name in ["cornell-box", "caustic", "lattice"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
-        let scene = Scene::new(&device, crate::load::scene(&path, &[("res".into(), "24".into())]).unwrap()).unwrap();
-        let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
-        let stage = Stage {
-            mapping: Mapping::new(&scene, widths),
-            footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
-            rng: Rng::new(9),
-        };
+        let scene = scene(name);
+        let stage = stage(&scene);
         let ladder = |k| (Method::ReplicaExchange, LadderChoice::Replicas(k));
         let plain = |method| (method, LadderChoice::default());
         for (method, ladder) in [plain(Method::Path), plain(Method::Mlt), ladder(2), ladder(5)] {
