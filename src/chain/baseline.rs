@@ -17,6 +17,8 @@ pub const LARGE_STEP_PROBABILITY: f64 = 0.3;
 pub struct Baseline<W> {
     walkers: Walkers,
     evaluator: Evaluator<W>,
+    /// Uniform number of each lane's decision at this step.
+    decisions: Vec<f64>,
     steps: u64,
     /// Σ of acceptance probabilities of small steps and how many there were.
     pub small: (f64, u64),
@@ -32,7 +34,7 @@ impl<W: Default> Baseline<W> {
         let mut walkers = Walkers::new(starts.len());
         let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, (0..starts.len()).map(counter).collect());
         replay(target, starts, &mut walkers, &mut evaluator);
-        Baseline { walkers, evaluator, steps: 0, small: (0.0, 0), large: (0.0, 0) }
+        Baseline { walkers, evaluator, decisions: vec![0.0; starts.len()], steps: 0, small: (0.0, 0), large: (0.0, 0) }
     }
 
     /// Every chain makes `steps` steps; states go to layer 0 as `unit` · f/g.
@@ -45,15 +47,16 @@ impl<W: Default> Baseline<W> {
 
     fn step<T: Target<Workspace = W>>(&mut self, target: &T, record: &mut impl FnMut(&Contribution, f64)) {
         let rng = self.evaluator.rng();
-        for (m, counter) in self.evaluator.moves.iter_mut().zip(&mut self.evaluator.counters) {
-            counter.step = self.steps;
-            let word = rng.words(Counter { purpose: Purpose::Step, ..*counter }, 0)[1];
-            *m = if open_unit_f64(word) < LARGE_STEP_PROBABILITY { Move::Fresh } else { Move::Small };
+        for lane in 0..self.decisions.len() {
+            self.evaluator.counters[lane].step = self.steps;
+            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
+            let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
+            self.decisions[lane] = decision;
+            self.evaluator.moves[lane] = if kind < LARGE_STEP_PROBABILITY { Move::Fresh } else { Move::Small };
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
-            let counter = self.evaluator.counters[lane];
-            let u = open_unit_f64(rng.words(Counter { purpose: Purpose::Step, ..counter }, 0)[0]);
+            let u = self.decisions[lane];
             let proposed = self.evaluator.out.lanes[lane];
             let alpha = self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, record);
             let count = if self.evaluator.moves[lane] == Move::Small { &mut self.small } else { &mut self.large };

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Stage, layer_with, mean},
+    engine::{Counts, Development, Engine, Stage, film_warnings, layer_with, mean},
     plan::Plan,
 };
 use crate::{
@@ -157,7 +157,7 @@ impl Engine for TwoPassMlt {
             image: stage.image(|i| [0, 1, 2].map(|channel| sums[i][channel] * scale)),
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
             normalisation: Some(self.normalisation),
-            warnings: Vec::new(),
+            warnings: film_warnings(&self.film),
         }
     }
 }

@@ -104,6 +104,14 @@ pub fn layer_with(film: &Accumulator, pending: &Splats, layer: usize) -> Vec<[f6
     sums
 }
 
+/// What the person should know about a film: sums beyond its range, which stay at its end.
+pub fn film_warnings(film: &Accumulator) -> Vec<String> {
+    match film.overflowed() {
+        0 => Vec::new(),
+        n => vec![format!("{n} splats were beyond the range of the film, whose brightest pixels are too dark by that")],
+    }
+}
+
 /// A mean that is 0 where there is nothing.
 pub fn mean(sum: f64, n: u64) -> f64 {
     if n == 0 { 0.0 } else { sum / n as f64 }

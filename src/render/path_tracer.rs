@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Stage},
+    engine::{Counts, Development, Engine, Stage, film_warnings},
     plan::Plan,
 };
 use crate::{
@@ -101,7 +101,7 @@ impl Engine for PathTracer {
             image,
             layers: vec![("density".into(), density)],
             normalisation: Some(uniform_mean(&groups)),
-            warnings: Vec::new(),
+            warnings: film_warnings(&self.film),
         }
     }
 }

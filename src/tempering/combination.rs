@@ -44,10 +44,14 @@ impl Weights {
         let known = ln_zeta.last().is_some_and(|z| z.is_finite());
         let ln_target = if known { ln_zeta[ln_zeta.len() - 1] } else { 0.0 };
         let ln_share: Vec<f64> = (0..ladder.rungs())
-            .map(|k| match () {
-                () if k == 0 => libm::log(counts[0]),
-                () if known && ln_zeta[k].is_finite() => libm::log(counts[k]) - ln_zeta[k],
-                () => f64::NEG_INFINITY,
+            .map(|k| {
+                if k == 0 {
+                    libm::log(counts[0])
+                } else if known && ln_zeta[k].is_finite() {
+                    libm::log(counts[k]) - ln_zeta[k]
+                } else {
+                    f64::NEG_INFINITY
+                }
             })
             .collect();
         let scale = (0..ladder.rungs())

@@ -23,7 +23,8 @@ use super::registry::Registry;
 use crate::load::faults::{Faults, Span};
 use crate::scene::Rgb;
 use crate::scene::description::{ShapeDescription, ShapeGeometry, Sides};
-use mesh::Repairs;
+use crate::scene::parameters::Parameters;
+use mesh::{Placement, RawMesh, Repairs};
 
 const SHAPES: Registry<fn(&mut ElementParameters, &Path) -> Option<Build>> = Registry {
     tag: "shape",
@@ -131,4 +132,32 @@ fn pending<'a>(
 /// The mesh file that `filename` names, beside the scene file.
 fn file(p: &mut ElementParameters, folder: &Path) -> Option<PathBuf> {
     p.required_string("filename").map(|name| folder.join(name))
+}
+
+/// A shape whose mesh a file holds: reads the parameters that all such shapes have; the file is read, by `parse`, by
+/// what this returns. `flip_tex_coords` is what the format does by default.
+fn mesh_file(
+    p: &mut ElementParameters,
+    folder: &Path,
+    flip_tex_coords: bool,
+    parse: fn(&[u8]) -> Result<RawMesh, String>,
+) -> Option<Build> {
+    let path = file(p, folder);
+    let flip_normals = p.boolean("flip_normals").unwrap_or(false);
+    let face_normals = p.boolean("face_normals").unwrap_or(false);
+    let flip_tex_coords = p.boolean("flip_tex_coords").unwrap_or(flip_tex_coords);
+    let placement = Placement { to_world: p.to_world(), flip_normals };
+    let path = path?;
+    Some(Box::new(move || {
+        let in_file = |message: String| format!("{}: {message}", path.display());
+        let bytes = std::fs::read(&path).map_err(|error| in_file(format!("cannot be read: {error}")))?;
+        let mut raw = parse(&bytes).map_err(in_file)?;
+        if face_normals {
+            raw.normals.clear();
+        }
+        if flip_tex_coords {
+            raw.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
+        }
+        raw.place(placement).map(Into::into).map_err(in_file)
+    }))
 }

@@ -10,30 +10,12 @@ use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Property, PropertyAccess, PropertyAccessResult};
 
 use super::super::parameters::ElementParameters;
-use super::mesh::{Placement, RawMesh};
-use super::{Build, file};
-use crate::scene::parameters::Parameters;
+use super::mesh::RawMesh;
+use super::{Build, mesh_file};
 
 /// Reads the element; the file is read by what it returns.
 pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
-    let path = file(p, folder);
-    let flip_normals = p.boolean("flip_normals").unwrap_or(false);
-    let face_normals = p.boolean("face_normals").unwrap_or(false);
-    let flip_tex_coords = p.boolean("flip_tex_coords").unwrap_or(false);
-    let placement = Placement { to_world: p.to_world(), flip_normals };
-    let path = path?;
-    Some(Box::new(move || {
-        let in_file = |message: String| format!("{}: {message}", path.display());
-        let bytes = std::fs::read(&path).map_err(|error| in_file(format!("cannot be read: {error}")))?;
-        let mut raw = parse(&bytes).map_err(in_file)?;
-        if face_normals {
-            raw.normals.clear();
-        }
-        if flip_tex_coords {
-            raw.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
-        }
-        raw.place(placement).map(Into::into).map_err(in_file)
-    }))
+    mesh_file(p, folder, false, parse)
 }
 
 /// The content of a file as one mesh.
