@@ -48,7 +48,7 @@ fn group<'c>(criterion: &'c mut Criterion, name: &str) -> BenchmarkGroup<'c, Wal
 /// A batch of lanes at uniform points.
 fn evaluator<W: Default>() -> Evaluator<W> {
     let counter = |lane| Counter { ladder: lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
-    let mut evaluator = Evaluator::new(Rng::new(0), StepLaw::KELEMEN, (0..LANES).map(counter).collect());
+    let mut evaluator = Evaluator::new(Rng::new(0), (0..LANES).map(counter).collect());
     evaluator.moves.fill(Move::Fresh);
     evaluator
 }
@@ -85,7 +85,7 @@ fn propose(group: &mut BenchmarkGroup<WallTime>, scene: &Scene, widths: Widths) 
     let mut paths = evaluator::<Workspace>();
     paths.evaluate(&Mapping::new(scene, widths), &Points::new(0));
     let draw = DrawOnly::like(&paths.points);
-    for (name, how) in [("fresh", Move::Fresh), ("small", Move::Small)] {
+    for (name, how) in [("fresh", Move::Fresh), ("small", Move::Small(StepLaw::KELEMEN))] {
         let mut proposals = evaluator();
         proposals.moves.fill(how);
         group.bench_function(BenchmarkId::new("propose", name), |bencher| {

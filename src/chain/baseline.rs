@@ -32,7 +32,7 @@ impl<W: Default> Baseline<W> {
         let counter =
             |lane: usize| Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
         let mut walkers = Walkers::new(starts.len());
-        let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, (0..starts.len()).map(counter).collect());
+        let mut evaluator = Evaluator::new(rng, (0..starts.len()).map(counter).collect());
         replay(target, starts, &mut walkers, &mut evaluator);
         Baseline { walkers, evaluator, decisions: vec![0.0; starts.len()], steps: 0, small: (0.0, 0), large: (0.0, 0) }
     }
@@ -52,14 +52,14 @@ impl<W: Default> Baseline<W> {
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
             let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
-            self.evaluator.moves[lane] = if kind < LARGE_STEP_PROBABILITY { Move::Fresh } else { Move::Small };
+            self.evaluator.moves[lane] = if kind < LARGE_STEP_PROBABILITY { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
             let u = self.decisions[lane];
             let proposed = self.evaluator.out.lanes[lane];
             let alpha = self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, record);
-            let count = if self.evaluator.moves[lane] == Move::Small { &mut self.small } else { &mut self.large };
+            let count = if self.evaluator.moves[lane] == Move::Fresh { &mut self.large } else { &mut self.small };
             *count = (count.0 + alpha, count.1 + 1);
         }
         self.steps += 1;

@@ -3,7 +3,7 @@
 use crate::{
     path::{Contributions, unidirectional},
     rng::{Counter, Rng},
-    sample::{Move, Points, Proposals, StepLaw},
+    sample::{Move, Points, Proposals},
 };
 
 /// A non-negative function on the unit cube, evaluated for a batch of points at a time.
@@ -28,7 +28,6 @@ impl Target for unidirectional::Mapping<'_> {
 /// Everything that one batch of proposals takes: moves, counters, proposed points and their contributions.
 pub struct Evaluator<W> {
     rng: Rng,
-    law: StepLaw,
     /// How each lane moves next.
     pub moves: Vec<Move>,
     /// Which words each lane draws next.
@@ -42,16 +41,15 @@ pub struct Evaluator<W> {
 
 impl<W: Default> Evaluator<W> {
     /// For as many lanes as there are counters; all lanes rest at first.
-    pub fn new(rng: Rng, law: StepLaw, counters: Vec<Counter>) -> Evaluator<W> {
-        Evaluator::with_workspace(rng, law, counters, W::default())
+    pub fn new(rng: Rng, counters: Vec<Counter>) -> Evaluator<W> {
+        Evaluator::with_workspace(rng, counters, W::default())
     }
 
     /// The same with a given workspace.
-    pub fn with_workspace(rng: Rng, law: StepLaw, counters: Vec<Counter>, workspace: W) -> Evaluator<W> {
+    pub fn with_workspace(rng: Rng, counters: Vec<Counter>, workspace: W) -> Evaluator<W> {
         let lanes = counters.len();
         Evaluator {
             rng,
-            law,
             moves: vec![Move::Rest; lanes],
             counters,
             points: Points::new(lanes),
@@ -78,7 +76,6 @@ impl<W: Default> Evaluator<W> {
             points: &mut self.points,
             counters: &self.counters,
             moves: &self.moves,
-            law: self.law,
         };
         target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
     }

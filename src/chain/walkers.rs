@@ -3,12 +3,12 @@
 use super::acceptance;
 use crate::{
     path::Contribution,
-    sample::{Move, Points},
+    sample::Points,
 };
 
 /// The current states of a batch of chains, each with the expected weight it has gathered and not yet recorded.
 ///
-/// A chain starts without a state (its contribution is dark). It leaves that by its first lit proposal or swap.
+/// Chains are put into lit states before their first step, and never leave the light: a dark proposal is not accepted.
 pub struct Walkers {
     /// Where each chain is.
     pub points: Points,
@@ -19,22 +19,16 @@ pub struct Walkers {
 }
 
 impl Walkers {
-    /// `lanes` chains without states.
+    /// `lanes` chains that wait to be put into a state.
     pub fn new(lanes: usize) -> Walkers {
         Walkers { points: Points::new(lanes), states: vec![Contribution::NONE; lanes], pending: vec![0.0; lanes] }
-    }
-
-    /// The move of a chain that explores by small steps: from nowhere only a fresh point can be proposed.
-    #[inline(always)]
-    pub fn exploring(&self, lane: usize) -> Move {
-        if self.states[lane].is_dark() { Move::Fresh } else { Move::Small }
     }
 
     /// One Metropolis step of a chain at inverse temperature `beta` towards lane `from` of the proposals: both
     /// states are weighted by their probabilities, whatever `u`, uniform in (0, 1), then decides.
     ///
     /// `record` receives states with their expected weights, once nothing more will be added to them; the weights
-    /// of a step sum to one, unless chain and proposal are both dark. Returns the acceptance probability.
+    /// of a step sum to one. Returns the acceptance probability.
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -46,9 +40,7 @@ impl Walkers {
         record: &mut impl FnMut(&Contribution, f64),
     ) -> f64 {
         let alpha = acceptance(beta, self.states[lane].ln_g, proposed.ln_g);
-        if !self.states[lane].is_dark() {
-            self.pending[lane] += 1.0 - alpha;
-        }
+        self.pending[lane] += 1.0 - alpha;
         if u < alpha {
             self.replace(lane, (points, from), proposed, record);
             self.pending[lane] = alpha;

@@ -43,6 +43,11 @@ impl Splats {
         Splats { layers: vec![Vec::new(); layers], ..Splats::default() }
     }
 
+    /// Number of layers.
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
     /// Adds a splat to a layer.
     #[inline]
     pub fn push(&mut self, layer: usize, splat: Splat) {

@@ -12,7 +12,7 @@ use crate::{
     film::{Accumulator, Plane, Splats},
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
-    sample::{Move, Points, StepLaw},
+    sample::{Move, Points},
     tempering::{Estimate, uniform_mean},
 };
 
@@ -98,7 +98,7 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
         .map(|batch| {
             let samples = batch * size..((batch + 1) * size).min(samples);
             let counters: Vec<Counter> = samples.map(bootstrap_counter).collect();
-            let mut evaluator = Evaluator::<Workspace>::new(stage.rng, StepLaw::KELEMEN, counters);
+            let mut evaluator = Evaluator::<Workspace>::new(stage.rng, counters);
             evaluator.moves.fill(Move::Fresh);
             evaluator.evaluate(&stage.mapping, &Points::new(0));
             let out = evaluator.out;

@@ -7,7 +7,7 @@ use crate::{
     embree::{Hits, Rays, Width},
     path::unidirectional::{Mapping, RecordedRays, Widths, Workspace},
     rng::{Counter, Purpose, Rng},
-    sample::{Move, Points, StepLaw},
+    sample::{Move, Points},
     scene::Scene,
 };
 
@@ -25,7 +25,7 @@ pub fn record_rays(scene: &Scene, batches: u64) -> RecordedRays {
     let counters = (0..LANES)
         .map(|lane| Counter { ladder: lane as u32, replica: 0, step: 0, purpose: Purpose::Primary })
         .collect();
-    let mut evaluator = Evaluator::with_workspace(Rng::new(0), StepLaw::KELEMEN, counters, Workspace::recording());
+    let mut evaluator = Evaluator::with_workspace(Rng::new(0), counters, Workspace::recording());
     evaluator.moves.fill(Move::Fresh);
     let nowhere = Points::new(0);
     for batch in 0..batches {

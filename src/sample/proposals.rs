@@ -4,14 +4,14 @@ use super::{Block, Points, StepLaw};
 use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
 
 /// How a lane's proposal comes about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Move {
     /// A uniform point of the cube.
     Fresh,
     /// A uniform point, but its first block is already set (stratified film positions).
     FreshAfterFirst,
-    /// A small step from the lane's current point.
-    Small,
+    /// A small step of this law from the lane's current point.
+    Small(StepLaw),
     /// The lane rests; nothing is drawn or evaluated.
     Rest,
 }
@@ -31,8 +31,6 @@ pub struct Proposals<'a> {
     pub counters: &'a [Counter],
     /// How each lane moves.
     pub moves: &'a [Move],
-    /// Sizes of small steps.
-    pub law: StepLaw,
 }
 
 impl Proposals<'_> {
@@ -75,7 +73,7 @@ impl Proposals<'_> {
     #[inline(always)]
     fn set(&mut self, block: u16, lane: usize, words: [u32; 4]) {
         let proposed = match self.moves[lane] {
-            Move::Small if block < self.current.used(lane) => self.law.step(self.current.block(block, lane), words),
+            Move::Small(law) if block < self.current.used(lane) => law.step(self.current.block(block, lane), words),
             Move::FreshAfterFirst if block == 0 => return,
             _ => words,
         };

@@ -1,246 +1,252 @@
-//! Ladders side by side: the batch that one thread works on at a time.
+//! Ladders side by side: what one thread works on at a time.
 
-use std::sync::Arc;
+use std::ops::Range;
 
-use super::{Histogram, Ladder, Weights, ladder::swap_acceptance};
+use rayon::prelude::*;
+
+use super::{
+    Canvas, Histogram, Round, RungCounts, Tally,
+    ladder::swap_acceptance,
+    steps::{self, SCALES},
+    trips::{IndexProcess, Trips},
+};
 use crate::{
-    chain::{Evaluator, Recorder, Start, Target, Walkers, replay},
+    chain::{Evaluator, Start, Target, Walkers, replay},
     path::Contribution,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
 
-/// Layers of the film that replica exchange fills.
-pub mod layer {
-    /// f of uniform points: the uniform replica's own estimate.
-    pub const UNIFORM: usize = 0;
-    /// What uniform points add to the image.
-    pub const HOT: usize = 1;
-    /// What tempered states add to the image, in the unit of [`Weights`](super::Weights).
-    pub const TEMPERED: usize = 2;
-}
-
-/// Number of [`layer`]s.
-pub const LAYERS: usize = 3;
-
-/// Counts of one tempered rung or of the swaps to it, mergeable by addition.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RungCounts {
-    /// Σ of acceptance probabilities of small steps.
-    pub accepted: f64,
-    /// Small steps proposed.
-    pub proposed: u64,
-    /// Σ of acceptance probabilities of swaps with the next hotter rung.
-    pub swapped: f64,
-    /// Such swaps offered.
-    pub offered: u64,
-}
-
-impl std::ops::AddAssign for RungCounts {
-    fn add_assign(&mut self, other: RungCounts) {
-        self.accepted += other.accepted;
-        self.proposed += other.proposed;
-        self.swapped += other.swapped;
-        self.offered += other.offered;
-    }
-}
-
-/// Whole ladders whose replicas and uniform points are evaluated together, one lane each.
+/// Whole ladders whose replicas and offered points are evaluated together.
 ///
-/// A sweep moves every replica once, draws `uniform_draws` fresh points for every ladder, offers each of those to
-/// its ladder's lowest chain, and swaps neighbours among the tempered rungs by even–odd parity (Okabe et al. 2001;
-/// Syed et al. 2021). All random words are named by (ladder, replica, sweep), never by the thread.
+/// A sweep moves every replica once, draws `offers` independent uniform points for every ladder and offers each to its
+/// ladder's lowest chain, then swaps neighbours among the tempered rungs by even–odd parity (Okabe et al. 2001; Syed et
+/// al. 2021). All random words are named by (ladder, replica, sweep), never by the thread or the batch.
+///
+/// Lanes are the replicas, ladder by ladder, and behind them the offers, ladder by ladder. They are cut into *parts* of
+/// a batch each: one where ladders are short, several where a ladder is longer than a batch. Parts explore side by side,
+/// also on several threads; swaps go between them.
 pub struct Block<W> {
-    ladder: Arc<Ladder>,
+    first_ladder: u32,
     ladders: usize,
-    uniform_draws: usize,
-    /// Lane of replica r of ladder l: l · (K − 1) + r.
-    walkers: Walkers,
+    /// Replicas of a ladder that move, K − 1.
+    chains: usize,
+    offers: usize,
+    lanes_a_part: usize,
+    parts: Vec<Part<W>>,
     /// Rung of each replica, 1 … K − 1.
     rung: Vec<u16>,
     /// Replica on each tempered rung of each ladder; the inverse of `rung`.
     replica_on: Vec<u16>,
-    /// The replicas' lanes, then `uniform_draws` lanes for each ladder.
-    evaluator: Evaluator<W>,
-    /// Sweeps in which chains moved, and those before.
+    trips: Trips,
+    /// Rungs of the first ladder's replicas; noted by the first block only.
+    index: Option<IndexProcess>,
     sweeps: u64,
-    bootstrap_sweeps: u64,
-    /// Independent samples of the bootstrap, until chains start.
-    bootstrap: Vec<Start>,
-    /// By rung; entry 0 is unused.
-    counts: Vec<RungCounts>,
-    /// What has been recorded.
-    seen: Statistics,
 }
 
-impl<W: Default> Block<W> {
-    /// Ladders `first_ladder`, `first_ladder + 1`, …, all without states, with `uniform_draws` ≥ 1 a sweep.
-    pub fn new(ladder: Arc<Ladder>, rng: Rng, first_ladder: u32, ladders: usize, uniform_draws: usize) -> Block<W> {
-        let chains = ladder.rungs() - 1;
-        let counter = |l: usize, replica: usize| Counter {
-            ladder: first_ladder + l as u32,
-            replica: replica as u16,
-            step: 0,
-            purpose: Purpose::Primary,
-        };
-        let replicas = (0..ladders * chains).map(|lane| counter(lane / chains, lane % chains));
-        let uniform = (0..ladders * uniform_draws).map(|i| counter(i / uniform_draws, chains + i % uniform_draws));
-        let mut evaluator = Evaluator::new(rng, StepLaw::KELEMEN, replicas.chain(uniform).collect());
-        evaluator.moves.fill(Move::Fresh);
-        Block {
-            walkers: Walkers::new(ladders * chains),
-            rung: (0..ladders * chains).map(|lane| (lane % chains) as u16 + 1).collect(),
-            replica_on: (0..ladders * chains).map(|lane| (lane % chains) as u16).collect(),
-            counts: vec![RungCounts::default(); ladder.rungs()],
-            seen: Statistics::new(ladder.rungs()),
-            bootstrap: Vec::new(),
-            ladder,
+/// A batch of lanes.
+struct Part<W> {
+    /// Lanes of the block that lie here.
+    lanes: Range<usize>,
+    /// Those of them that are replicas come first.
+    replicas: usize,
+    walkers: Walkers,
+    evaluator: Evaluator<W>,
+    tally: Tally,
+    /// Steps in a row that each chain refused.
+    refused: Vec<u32>,
+    /// Scale of each replica's step at work, and the random word that will decide on it.
+    scale: Vec<u8>,
+    decision: Vec<u32>,
+}
+
+impl<W: Default + Send> Block<W> {
+    /// Ladders `first_ladder`, `first_ladder + 1`, … of `rungs` ≥ 2, all without states, with `offers` ≥ 1 a sweep, in
+    /// parts of at most `lanes_a_part`.
+    pub fn new(
+        rng: Rng,
+        (first_ladder, ladders): (u32, usize),
+        rungs: usize,
+        offers: usize,
+        lanes_a_part: usize,
+        layers: usize,
+    ) -> Block<W> {
+        let chains = rungs - 1;
+        let replicas = ladders * chains;
+        let mut block = Block {
+            first_ladder,
             ladders,
-            uniform_draws,
-            evaluator,
+            chains,
+            offers,
+            lanes_a_part,
+            parts: Vec::new(),
+            rung: (0..replicas).map(|lane| (lane % chains) as u16 + 1).collect(),
+            replica_on: (0..replicas).map(|lane| (lane % chains) as u16).collect(),
+            trips: Trips::new(replicas, chains),
+            index: (first_ladder == 0).then(IndexProcess::default),
             sweeps: 0,
-            bootstrap_sweeps: 0,
+        };
+        let lanes = block.lanes();
+        for start in (0..lanes).step_by(lanes_a_part) {
+            let range = start..(start + lanes_a_part).min(lanes);
+            let own = replicas.clamp(range.start, range.end) - range.start;
+            block.parts.push(Part {
+                replicas: own,
+                walkers: Walkers::new(own),
+                evaluator: Evaluator::new(rng, range.clone().map(|lane| block.counter(lane)).collect()),
+                tally: Tally::new(rungs, layers),
+                refused: vec![0; own],
+                scale: vec![0; own],
+                decision: vec![0; own],
+                lanes: range,
+            });
         }
+        block
     }
 
-    /// Evaluates every lane at a fresh uniform point in each of `sweeps` sweeps: independent samples for the
-    /// uniform replica's own estimate, for the normalisers, and for chains to [`start`](Self::start) from.
-    pub fn bootstrap<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, recorder: &mut Recorder) {
-        self.evaluator.moves.fill(Move::Fresh);
-        for _ in 0..sweeps {
-            for counter in &mut self.evaluator.counters {
-                (counter.step, counter.purpose) = (self.bootstrap_sweeps, Purpose::Bootstrap);
-            }
-            self.evaluator.evaluate(target, &self.walkers.points);
-            for (counter, point) in self.evaluator.counters.iter().zip(&self.evaluator.out.lanes) {
-                self.bootstrap.push(Start { counter: *counter, ln_g: point.ln_g });
-                self.seen.uniform_point(point, recorder);
-            }
-            self.bootstrap_sweeps += 1;
-        }
-        self.evaluator.counters.iter_mut().for_each(|counter| counter.purpose = Purpose::Primary);
-    }
-
-    /// The samples of the bootstrap, which are forgotten here.
-    pub fn take_bootstrap(&mut self) -> Vec<Start> {
-        std::mem::take(&mut self.bootstrap)
-    }
-
-    /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block. Without any,
-    /// chains stay null until they meet light.
-    pub fn start<T: Target<Workspace = W>>(&mut self, target: &T, starts: &[&[Start]]) {
-        let chains = self.ladder.rungs() - 1;
-        if starts.iter().all(|rung| rung.is_empty()) {
+    /// Changes the number of points offered to a ladder each sweep.
+    pub fn set_offers(&mut self, rng: Rng, offers: usize) {
+        if offers == self.offers {
             return;
         }
+        self.offers = offers;
+        let layers = self.parts[0].tally.splats.layers();
+        let rungs = self.chains + 1;
+        let (lanes, replicas) = (self.lanes(), self.rung.len());
+        let parts = lanes.div_ceil(self.lanes_a_part);
+        self.parts.truncate(parts.max(replicas.div_ceil(self.lanes_a_part)));
+        for number in 0..parts {
+            let start = number * self.lanes_a_part;
+            let range = start..(start + self.lanes_a_part).min(lanes);
+            let evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
+            match self.parts.get_mut(number) {
+                Some(part) => (part.lanes, part.evaluator) = (range, evaluator),
+                None => self.parts.push(Part {
+                    lanes: range,
+                    replicas: 0,
+                    walkers: Walkers::new(0),
+                    evaluator,
+                    tally: Tally::new(rungs, layers),
+                    refused: Vec::new(),
+                    scale: Vec::new(),
+                    decision: Vec::new(),
+                }),
+            }
+        }
+    }
+
+    /// The counter of a lane: replicas are numbered from 0, offers behind them.
+    fn counter(&self, lane: usize) -> Counter {
+        let replicas = self.rung.len();
+        let (ladder, number) = if lane < replicas {
+            (lane / self.chains, lane % self.chains)
+        } else {
+            ((lane - replicas) / self.offers, self.chains + (lane - replicas) % self.offers)
+        };
+        Counter {
+            ladder: self.first_ladder + ladder as u32,
+            replica: number as u16,
+            step: self.sweeps,
+            purpose: Purpose::Primary,
+        }
+    }
+
+    /// Evaluations of a sweep.
+    pub fn lanes(&self) -> usize {
+        self.ladders * (self.chains + self.offers)
+    }
+
+    /// Part of a lane, and its place there.
+    fn place(&self, lane: usize) -> (usize, usize) {
+        (lane / self.lanes_a_part, lane % self.lanes_a_part)
+    }
+
+    /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block.
+    pub fn start<T: Target<Workspace = W>>(&mut self, target: &T, starts: &[&[Start]]) {
         // neighbouring rungs were resampled in the same order: rotated, so that a ladder does not start everywhere
         // from the same sample
         let of_lane = |lane: usize| {
-            let (ladder, replica) = (lane / chains, lane % chains);
-            starts[replica][(ladder + replica * self.ladders.div_ceil(chains)) % self.ladders]
+            let (ladder, replica) = (lane / self.chains, lane % self.chains);
+            starts[replica][(ladder + replica * self.ladders.div_ceil(self.chains)) % self.ladders]
         };
-        let starts: Vec<Start> = (0..self.rung.len()).map(of_lane).collect();
-        replay(target, &starts, &mut self.walkers, &mut self.evaluator);
-        self.evaluator.moves.fill(Move::Fresh);
+        for part in &mut self.parts {
+            let starts: Vec<Start> = part.lanes.clone().take(part.replicas).map(of_lane).collect();
+            replay(target, &starts, &mut part.walkers, &mut part.evaluator);
+        }
     }
 
     /// Goes through `sweeps` sweeps.
-    pub fn advance<T: Target<Workspace = W>>(
-        &mut self,
-        target: &T,
-        sweeps: u64,
-        weights: &Weights,
-        recorder: &mut Recorder,
-    ) {
+    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, canvas: &Canvas, round: &Round) {
+        let bank = steps::bank();
         for _ in 0..sweeps {
-            self.propose(target);
-            self.explore(weights, recorder);
-            self.inject(weights, recorder);
-            self.swap(weights, recorder);
+            let (rung, sweep) = (&self.rung, self.sweeps);
+            let explore = |part: &mut Part<W>| part.explore(target, canvas, round, &bank, rung, sweep);
+            match &mut self.parts[..] {
+                [part] => explore(part),
+                parts => parts.par_iter_mut().for_each(explore),
+            }
+            self.inject(canvas, round);
+            self.swap(canvas, round);
+            for (lane, k) in self.rung.iter().enumerate() {
+                self.trips.stays(lane, usize::from(*k));
+            }
+            if let Some(index) = &mut self.index {
+                index.note(&self.rung[..self.chains]);
+            }
             self.sweeps += 1;
         }
     }
 
-    /// Evaluates a proposal for every replica and the fresh uniform points, all in one batch.
-    fn propose<T: Target<Workspace = W>>(&mut self, target: &T) {
-        for counter in &mut self.evaluator.counters {
-            counter.step = self.sweeps;
-        }
-        for lane in 0..self.rung.len() {
-            self.evaluator.moves[lane] = self.walkers.exploring(lane);
-        }
-        self.evaluator.evaluate(target, &self.walkers.points);
-    }
-
-    /// One Metropolis step of every replica at its own inverse temperature.
-    fn explore(&mut self, weights: &Weights, recorder: &mut Recorder) {
-        let rng = self.evaluator.rng();
-        for lane in 0..self.rung.len() {
-            let k = usize::from(self.rung[lane]);
-            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
-            let u = open_unit_f64(rng.words(counter, 0)[0]);
-            let proposed = self.evaluator.out.lanes[lane];
-            let mut record = record(weights, k, &mut self.seen, recorder);
-            let small = self.evaluator.moves[lane] == Move::Small;
-            let beta = self.ladder.betas()[k];
-            let alpha = self.walkers.step(lane, beta, (&self.evaluator.points, lane), &proposed, u, &mut record);
-            if small {
-                self.counts[k].accepted += alpha;
-                self.counts[k].proposed += 1;
-            }
-        }
-    }
-
-    /// Records the uniform points and offers each to the lowest chain of its ladder, a swap that costs nothing.
-    fn inject(&mut self, weights: &Weights, recorder: &mut Recorder) {
-        let rng = self.evaluator.rng();
-        let chains = self.ladder.rungs() - 1;
-        let coldest_of_pair = self.ladder.betas()[1];
-        for i in 0..self.ladders * self.uniform_draws {
-            let from = self.rung.len() + i;
-            let point = self.evaluator.out.lanes[from];
-            self.seen.uniform_point(&point, recorder);
-            if weights.use_uniform() {
-                let share = if point.is_dark() { 0.0 } else { weights.uniform(point.ln_g) };
-                recorder.splat(layer::HOT, &point, share, 1.0);
-            }
-            if point.is_dark() {
-                self.counts[1].offered += 1;
+    /// Offers each fresh point to the lowest chain of its ladder, a swap that costs nothing.
+    fn inject(&mut self, canvas: &Canvas, round: &Round) {
+        let replicas = self.rung.len();
+        let lowest = round.ladder.betas()[1];
+        for i in 0..self.ladders * self.offers {
+            let ladder = i / self.offers;
+            let lane = ladder * self.chains + usize::from(self.replica_on[ladder * self.chains]);
+            let ((from, at), (to, place)) = (self.place(replicas + i), self.place(lane));
+            let point = self.parts[from].evaluator.out.lanes[at];
+            let alpha = swap_acceptance(0.0, point.ln_g, lowest, self.parts[to].walkers.states[place].ln_g);
+            self.parts[to].tally.counts[1].swaps.add(alpha);
+            if alpha == 0.0 {
                 continue;
             }
-            let ladder = i / self.uniform_draws;
-            let lane = ladder * chains + usize::from(self.replica_on[ladder * chains]);
-            let alpha = swap_acceptance(0.0, point.ln_g, coldest_of_pair, self.walkers.states[lane].ln_g);
-            self.counts[1].swapped += alpha;
-            self.counts[1].offered += 1;
-            let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[from] };
-            if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
-                let mut record = record(weights, 1, &mut self.seen, recorder);
-                self.walkers.replace(lane, (&self.evaluator.points, from), &point, &mut record);
+            let evaluator = &self.parts[from].evaluator;
+            let counter = Counter { purpose: Purpose::Swap, ..evaluator.counters[at] };
+            if open_unit_f64(evaluator.rng().words(counter, 0)[0]) < alpha {
+                self.trips.renewed(lane);
+                if from == to {
+                    let Part { walkers, evaluator, tally, .. } = &mut self.parts[to];
+                    let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, 1, state, w);
+                    walkers.replace(place, (&evaluator.points, at), &point, &mut record);
+                } else {
+                    let parts = self.parts.get_disjoint_mut([from, to]).expect("two parts");
+                    let [Part { evaluator, .. }, Part { walkers, tally, .. }] = parts;
+                    let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, 1, state, w);
+                    walkers.replace(place, (&evaluator.points, at), &point, &mut record);
+                }
             }
         }
     }
 
     /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones.
-    fn swap(&mut self, weights: &Weights, recorder: &mut Recorder) {
-        let rng = self.evaluator.rng();
-        let rungs = self.ladder.rungs();
-        let chains = rungs - 1;
+    fn swap(&mut self, canvas: &Canvas, round: &Round) {
+        let rng = self.parts[0].evaluator.rng();
+        let betas = round.ladder.betas();
         for ladder in 0..self.ladders {
-            let base = ladder * chains;
-            for hotter in (1 + (self.sweeps % 2) as usize..rungs - 1).step_by(2) {
+            let base = ladder * self.chains;
+            let counter = Counter { purpose: Purpose::Swap, ..self.counter(base) };
+            for hotter in (1 + (self.sweeps % 2) as usize..self.chains).step_by(2) {
                 let colder = hotter + 1;
                 let lanes = [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
-                let betas = self.ladder.betas();
-                let [h, c] = lanes.map(|lane| self.walkers.states[lane].ln_g);
+                let places = lanes.map(|lane| self.place(lane));
+                let [h, c] = places.map(|(part, at)| self.parts[part].walkers.states[at].ln_g);
                 let alpha = swap_acceptance(betas[hotter], h, betas[colder], c);
-                self.counts[colder].swapped += alpha;
-                self.counts[colder].offered += 1;
-                let counter = Counter { purpose: Purpose::Swap, ..self.evaluator.counters[base] };
+                self.parts[places[1].0].tally.counts[colder].swaps.add(alpha);
                 if open_unit_f64(rng.words(counter, colder as u16)[0]) < alpha {
-                    for (lane, k) in lanes.into_iter().zip([hotter, colder]) {
-                        let mut record = record(weights, k, &mut self.seen, recorder);
-                        self.walkers.flush(lane, &mut record);
+                    for ((part, at), k) in places.into_iter().zip([hotter, colder]) {
+                        let Part { walkers, tally, .. } = &mut self.parts[part];
+                        walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
                     }
                     self.rung.swap(lanes[0], lanes[1]);
                     self.replica_on.swap(base + hotter - 1, base + colder - 1);
@@ -249,101 +255,129 @@ impl<W: Default> Block<W> {
         }
     }
 
-    /// Records what all current states have gathered; must happen before the weights change.
-    pub fn flush(&mut self, weights: &Weights, recorder: &mut Recorder) {
-        for lane in 0..self.rung.len() {
-            let k = usize::from(self.rung[lane]);
-            let mut record = record(weights, k, &mut self.seen, recorder);
-            self.walkers.flush(lane, &mut record);
-        }
-    }
-
-    /// The block's statistics as they are recorded.
-    pub fn recorded(&self) -> &Statistics {
-        &self.seen
-    }
-
-    /// The block's statistics with those of states not yet recorded; the pending splats go to `recorder`.
-    pub fn with_pending(&self, weights: &Weights, recorder: &mut Recorder) -> Statistics {
-        let mut seen = self.seen.clone();
-        for (lane, (state, &pending)) in self.walkers.states.iter().zip(&self.walkers.pending).enumerate() {
-            if pending > 0.0 {
-                record(weights, usize::from(self.rung[lane]), &mut seen, recorder)(state, pending);
+    /// Records what all current states have gathered; must happen before the round ends.
+    pub fn flush(&mut self, canvas: &Canvas, round: &Round) {
+        for part in &mut self.parts {
+            for at in 0..part.replicas {
+                let k = usize::from(self.rung[part.lanes.start + at]);
+                let tally = &mut part.tally;
+                part.walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
             }
         }
-        seen
     }
 
-    /// Acceptances and swaps by rung; entry 0 is empty.
-    pub fn counts(&self) -> &[RungCounts] {
-        &self.counts
-    }
-
-    /// Evaluations so far: steps of replicas and uniform points.
-    pub fn mutations(&self) -> u64 {
-        (self.bootstrap_sweeps + self.sweeps) * self.evaluator.moves.len() as u64
-    }
-
-    /// Rays traced and contributions settled so far.
-    pub fn rays_and_faults(&self) -> (u64, u64) {
-        (self.evaluator.out.rays, self.evaluator.out.non_finite)
-    }
-}
-
-/// What a block has seen; input of the [`Normalisers`](super::Normalisers).
-#[derive(Clone, Debug)]
-pub struct Statistics {
-    /// ln g of uniform points.
-    pub uniform: Histogram,
-    /// Σ g over uniform points.
-    pub uniform_sum: f64,
-    /// Number of uniform points.
-    pub uniform_points: u64,
-    /// ln g of states on tempered rungs, weighted.
-    pub tempered: Histogram,
-    /// Weight of states by rung; entry 0 stays 0.
-    pub weights: Vec<f64>,
-    /// Weight of states that went to the film, all rungs.
-    pub deposited: f64,
-}
-
-impl Statistics {
-    fn new(rungs: usize) -> Statistics {
-        Statistics {
-            uniform: Histogram::default(),
-            uniform_sum: 0.0,
-            uniform_points: 0,
-            tempered: Histogram::default(),
-            weights: vec![0.0; rungs],
-            deposited: 0.0,
+    /// Records into `tally` what the current states have gathered, and leaves them as they are.
+    pub fn pending(&self, canvas: &Canvas, round: &Round, tally: &mut Tally) {
+        for part in &self.parts {
+            for (at, &weight) in part.walkers.pending.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                let k = usize::from(self.rung[part.lanes.start + at]);
+                tally.state(canvas, round, k, &part.walkers.states[at], weight);
+            }
         }
     }
 
-    /// Records an independent sample; the film counts dark ones too.
-    #[inline(always)]
-    fn uniform_point(&mut self, point: &Contribution, recorder: &mut Recorder) {
-        self.uniform.add(point.ln_g, 1.0);
-        self.uniform_points += 1;
-        self.uniform_sum += point.g();
-        recorder.splat(layer::UNIFORM, point, 1.0, 1.0);
+    /// Puts what was splatted onto the film.
+    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
+        self.parts.iter_mut().for_each(|part| part.tally.deposit(canvas, block));
+    }
+
+    /// Adds the histograms to those of the group, by rung.
+    pub fn add_histograms(&self, group: &mut [Histogram]) {
+        for part in &self.parts {
+            group.iter_mut().zip(&part.tally.histograms).for_each(|(sum, h)| sum.merge(h));
+        }
+    }
+
+    /// Forgets the states seen on tempered rungs, whose inverse temperatures are about to change; what was seen of
+    /// the uniform rung stays.
+    pub fn forget_tempered(&mut self) {
+        for part in &mut self.parts {
+            part.tally.histograms[1..].fill(Histogram::default());
+        }
+    }
+
+    /// Adds the round's counts, by rung.
+    pub fn add_counts(&self, sums: &mut [RungCounts]) {
+        for part in &self.parts {
+            sums.iter_mut().zip(&part.tally.counts).for_each(|(sum, counts)| sum.add(counts));
+        }
+    }
+
+    /// Empties the round's counts.
+    pub fn reset_counts(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.tally.reset_counts());
+        self.trips.reset_counts();
+        self.index = self.index.is_some().then(IndexProcess::default);
+    }
+
+    /// Round trips, restarts and dwell times of the round.
+    pub fn trips(&self) -> &Trips {
+        &self.trips
+    }
+
+    /// The rungs of the first ladder's replicas over the round; of the first block only.
+    pub fn index(&self) -> Option<&IndexProcess> {
+        self.index.as_ref()
+    }
+
+    /// Sweeps so far.
+    pub fn sweeps(&self) -> u64 {
+        self.sweeps
+    }
+
+    /// Rays traced and contributions settled since this was last asked for.
+    pub fn take_rays_and_faults(&mut self) -> [u64; 2] {
+        let mut sums = [0; 2];
+        for part in &mut self.parts {
+            sums[0] += std::mem::take(&mut part.evaluator.out.rays);
+            sums[1] += std::mem::take(&mut part.evaluator.out.non_finite);
+        }
+        sums
     }
 }
 
-/// A recorder of states on rung `k`: into the statistics and, by the weights, onto the film.
-#[inline(always)]
-fn record<'r>(
-    weights: &'r Weights,
-    k: usize,
-    seen: &'r mut Statistics,
-    recorder: &'r mut Recorder<'_>,
-) -> impl FnMut(&Contribution, f64) {
-    move |state, weight| {
-        seen.tempered.add(state.ln_g, weight);
-        seen.weights[k] += weight;
-        let value = weights.tempered(k, state.ln_g);
-        if value > 0.0 {
-            seen.deposited += weight;
-            recorder.splat(layer::TEMPERED, state, value * weight, weight);
+impl<W: Default> Part<W> {
+    /// One Metropolis step of every replica at its own inverse temperature, and fresh points to offer, in one batch.
+    fn explore<T: Target<Workspace = W>>(
+        &mut self,
+        target: &T,
+        canvas: &Canvas,
+        round: &Round,
+        bank: &[StepLaw; SCALES],
+        rung: &[u16],
+        sweep: u64,
+    ) {
+        let rng = self.evaluator.rng();
+        self.evaluator.counters.iter_mut().for_each(|counter| counter.step = sweep);
+        self.evaluator.moves[self.replicas..].fill(Move::Fresh);
+        for at in 0..self.replicas {
+            let k = usize::from(rung[self.lanes.start + at]);
+            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
+            let [decision, choice, ..] = rng.words(counter, 0);
+            self.decision[at] = decision;
+            self.scale[at] = round.mixes[k].pick(open_unit_f64(choice)) as u8;
+            self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);
+        }
+        self.evaluator.evaluate(target, &self.walkers.points);
+
+        let Part { walkers, evaluator, tally, .. } = self;
+        let half = usize::from(sweep >= round.half);
+        for at in 0..self.replicas {
+            let k = usize::from(rung[self.lanes.start + at]);
+            let proposed = evaluator.out.lanes[at];
+            let beta = round.ladder.betas()[k];
+            let u = open_unit_f64(self.decision[at]);
+            let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = walkers.step(at, beta, (&evaluator.points, at), &proposed, u, &mut record);
+            let counts = &mut tally.counts[k];
+            counts.steps[usize::from(self.scale[at])].add(alpha);
+            let [sum, weight] = &mut counts.halves[half];
+            (*sum, *weight) = (*sum + walkers.states[at].ln_g, *weight + 1.0);
+            self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
+            counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
+        }
+        for point in &evaluator.out.lanes[self.replicas..] {
+            tally.uniform_point(canvas, round, point);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The ladder and the acceptance of swaps on it.
 
-/// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1, K ≥ 2.
+/// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1; for K = 1 the uniform distribution alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ladder {
     betas: Vec<f64>,
@@ -16,15 +16,21 @@ impl Ladder {
     /// If they do not rise strictly from 0 to 1 or are more than [`LONGEST`](Self::LONGEST); what people give is
     /// checked, with better words, by [`Settings`](crate::render::Settings).
     pub fn new(betas: Vec<f64>) -> Ladder {
-        assert!((2..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
-        assert!(betas[0] == 0.0 && betas[betas.len() - 1] == 1.0, "from {} to {}", betas[0], betas[betas.len() - 1]);
+        assert!((1..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
+        let last = betas[betas.len() - 1];
+        assert!(betas[0] == 0.0 && (betas.len() == 1 || last == 1.0), "from {} to {last}", betas[0]);
         assert!(betas.windows(2).all(|pair| pair[0] < pair[1]), "inverse temperatures must rise: {betas:?}");
         Ladder { betas }
     }
 
-    /// `rungs` equal steps from 0 to 1; 2 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
+    /// `rungs` equal steps from 0 to 1; 1 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
     pub fn even(rungs: usize) -> Ladder {
-        Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1) as f64).collect())
+        Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1).max(1) as f64).collect())
+    }
+
+    /// The uniform distribution alone: no chains.
+    pub fn uniform() -> Ladder {
+        Ladder::even(1)
     }
 
     /// The inverse temperatures.
@@ -35,6 +41,11 @@ impl Ladder {
     /// Number of rungs K, the uniform one included.
     pub fn rungs(&self) -> usize {
         self.betas.len()
+    }
+
+    /// Number of rungs that have chains, K − 1.
+    pub fn chains(&self) -> usize {
+        self.betas.len() - 1
     }
 }
 
@@ -61,6 +72,7 @@ mod tests {
 
     #[test]
     fn an_even_ladder_rises_from_the_uniform_distribution_to_the_target() {
+        assert_eq!(Ladder::uniform().betas(), [0.0]);
         assert_eq!(Ladder::even(2).betas(), [0.0, 1.0]);
         assert_eq!(Ladder::even(3).betas(), [0.0, 0.5, 1.0]);
     }

@@ -27,7 +27,7 @@ fn moves(step: u64) -> Vec<Move> {
         0 => Move::Rest,
         1 => Move::Fresh,
         2 => Move::FreshAfterFirst,
-        _ => Move::Small,
+        _ => Move::Small(law()),
     };
     (0..LANES as u64).map(of_lane).collect()
 }
@@ -70,7 +70,7 @@ fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) 
         place_first_blocks(&mut points, &moves, step);
         let counters = counters(step);
         let mut proposals =
-            Proposals { rng, current: &current, points: &mut points, counters: &counters, moves: &moves, law: law() };
+            Proposals { rng, current: &current, points: &mut points, counters: &counters, moves: &moves };
         let mut live = Vec::new();
         proposals.begin(&mut live);
         for lane in (0..LANES).filter(|lane| moves[*lane] == Move::Rest) {

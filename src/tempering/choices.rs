@@ -1,0 +1,76 @@
+//! What may be chosen about a ladder.
+
+use serde::Serialize;
+
+/// The rungs of the ladders.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LadderChoice {
+    /// Their number follows from the communication barrier, and chains are given up where path tracing is best.
+    #[default]
+    Auto,
+    /// So many, the uniform one included, placed at equal rejection.
+    Replicas(u32),
+    /// These inverse temperatures, rising from 0 to 1.
+    Betas(Vec<f64>),
+}
+
+/// How the estimates of the rungs become one image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Combine {
+    /// All samples of all rungs, weighed by the balance heuristic: unbiased given the normalisers.
+    #[default]
+    Balance,
+    /// Only the rung β = 1, times the normalisation.
+    Target,
+    /// Only the rung β = 0.
+    Uniform,
+    /// The paper's: the larger of `Target` and `Uniform` in each pixel and channel; biased.
+    Max,
+    /// The paper's power heuristic of the two; biased.
+    Power,
+    /// The paper's median heuristic of the two, with the sign that suppresses outliers; biased.
+    Median,
+    /// The same with the sign as the paper prints it; biased.
+    MedianPrinted,
+}
+
+impl Combine {
+    /// All of them, the default first.
+    pub const ALL: [Combine; 7] = [
+        Combine::Balance,
+        Combine::Target,
+        Combine::Uniform,
+        Combine::Max,
+        Combine::Power,
+        Combine::Median,
+        Combine::MedianPrinted,
+    ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Combine::Balance => "balance",
+            Combine::Target => "target",
+            Combine::Uniform => "uniform",
+            Combine::Max => "max",
+            Combine::Power => "power",
+            Combine::Median => "median",
+            Combine::MedianPrinted => "median-printed",
+        }
+    }
+}
+
+/// Everything that may be chosen about replica exchange.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choices {
+    /// The rungs.
+    pub ladder: LadderChoice,
+    /// How they become an image.
+    pub combine: Combine,
+    /// Share of evaluations that are uniform points, 0 < share < 1; tuned where absent.
+    pub uniform_share: Option<f64>,
+    /// Keep E_u, E_e and every rung's part of the image.
+    pub layers: bool,
+}

@@ -1,0 +1,118 @@
+//! Probes: a part of the pixels where the image is made several times over, to learn which weights serve it best.
+//!
+//! Independent halves of the ladders fill separate films, so the difference of the halves shows the error of the image
+//! as it is, correlations of chains and evenness of pixels included.
+
+use crate::film::{Accumulator, Splat, Splats};
+
+/// What a chain state may count for beside a uniform point, ρ, from 0 (path tracing) on.
+pub const RATIOS: [f64; 8] = [0.0, 1.0 / 1024.0, 1.0 / 256.0, 1.0 / 64.0, 1.0 / 16.0, 1.0 / 4.0, 1.0, 4.0];
+
+/// Pixels that are probed, at most.
+const MOST_PROBES: usize = 1 << 14;
+
+/// Which pixels are probed.
+#[derive(Clone, Debug)]
+pub struct ProbeMap {
+    pixels: u32,
+    stride: u32,
+}
+
+impl ProbeMap {
+    /// Probes for a film of that size, evenly spread.
+    pub fn new([width, height]: [u32; 2]) -> ProbeMap {
+        let pixels = width * height;
+        let fewest = (pixels as usize).div_ceil(MOST_PROBES) as u32;
+        // a stride that shares a divisor with the width would probe some columns only
+        let common = |mut a: u32, mut b: u32| {
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        };
+        let stride = (fewest..).find(|s| *s == 1 || common(*s, width) == 1).expect("one above the width is coprime");
+        ProbeMap { pixels, stride }
+    }
+
+    /// Number of probes.
+    pub fn len(&self) -> usize {
+        self.pixels.div_ceil(self.stride) as usize
+    }
+
+    /// The probe of a pixel.
+    #[inline(always)]
+    pub fn of_pixel(&self, pixel: u32) -> Option<u32> {
+        pixel.is_multiple_of(self.stride).then(|| pixel / self.stride)
+    }
+
+    /// The pixel of a probe.
+    pub fn pixel(&self, probe: usize) -> usize {
+        probe * self.stride as usize
+    }
+}
+
+/// Luminance gathered by the probes in each half of the blocks, one layer for each of [`RATIOS`].
+pub struct Probes {
+    halves: [Accumulator; 2],
+}
+
+impl Probes {
+    /// Empty probes; `unit` as for the film.
+    pub fn new(map: &ProbeMap, unit: f64) -> Probes {
+        Probes { halves: [(); 2].map(|()| Accumulator::new(map.len() as u32, 1, RATIOS.len(), unit)) }
+    }
+
+    /// Splats for [`deposit`](Self::deposit).
+    pub fn splats() -> Splats {
+        Splats::new(RATIOS.len())
+    }
+
+    /// What a uniform point adds for each ratio.
+    #[inline(always)]
+    pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64) {
+        for (layer, ratio) in RATIOS.into_iter().enumerate() {
+            splats.push(layer, Splat { pixel: probe, rgb: [value(ratio) as f32, 0.0, 0.0], weight: 1.0 });
+        }
+    }
+
+    /// What a state of a chain adds for each ratio but 0, with its expected weight in `value`.
+    #[inline(always)]
+    pub fn tempered(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64) {
+        for (layer, ratio) in RATIOS.into_iter().enumerate().skip(1) {
+            splats.push(layer, Splat { pixel: probe, rgb: [0.0, value(ratio) as f32, 0.0], weight: 0.0 });
+        }
+    }
+
+    /// Adds the splats of block number `block`.
+    pub fn deposit(&self, block: usize, splats: &mut Splats) {
+        self.halves[block % 2].deposit(splats);
+    }
+
+    /// Σ over uniform points, Σ over states, and number of uniform points, of every probe in both halves.
+    pub fn sums(&self, ratio: usize) -> Vec<[[f64; 3]; 2]> {
+        let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(ratio));
+        a.into_iter().zip(b).map(|(a, b)| [a, b].map(|[uniform, tempered, _, n]| [uniform, tempered, n])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probes_are_spread_over_rows_and_columns() {
+        for size in [[1, 1], [128, 1], [256, 256], [1920, 1080], [1, 70000], [4096, 4096]] {
+            let map = ProbeMap::new(size);
+            let pixels = size[0] * size[1];
+            assert!(map.len() <= MOST_PROBES.max(1) && map.len() >= (pixels as usize).min(MOST_PROBES) / 4, "{size:?}");
+            let mut columns = vec![0; size[0] as usize];
+            for probe in 0..map.len() {
+                let pixel = map.pixel(probe);
+                assert_eq!(map.of_pixel(pixel as u32), Some(probe as u32));
+                columns[pixel % size[0] as usize] += 1;
+            }
+            let (least, most) = (columns.iter().min().unwrap(), columns.iter().max().unwrap());
+            assert!(most - least <= 1 + size[0] as i32 / 1000, "{size:?}: {least} to {most} probes a column");
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Replica exchange from the first point to the image: rounds, what is learnt in them, and what is made of it.
+//!
+//! The first sweeps are uniform points only. They tell how much of the cube is lit and how g is spread: from that the
+//! rungs follow, and the states that chains start from. (Chains that started from nothing and waited for swaps left the
+//! image 10 % dark after 500 sweeps, where a bright light fills little of the picture.) Then sweeps come in rounds of
+//! doubling length. Within a round nothing changes; between rounds normalisers, rungs, step sizes, the weights of the
+//! image and the share of uniform points are made from what was seen before, until they are frozen.
+
+use rayon::prelude::*;
+
+use super::{
+    Block, Canvas, Choices, Combine, DensityOfStates, Estimate, Histogram, Ladder, LadderChoice, Layers, Normalisers,
+    ProbeMap, Probes, Round, RungCounts, StepMix, Tally, Weights, independent::Independent, probes::RATIOS,
+    tuning::{Choice, Measured}, uniform_mean,
+};
+use crate::{
+    chain::{Plan, Start, Target, resample},
+    film::{Accumulator, Footprint},
+    rng::Rng,
+};
+
+/// Uniform points before chains start; a sixteenth of the run where that is less.
+const BOOTSTRAP: u64 = 1 << 17;
+/// The part of a run of known length within which everything is learnt; what comes after is frozen.
+const LEARNING_PART: f64 = 0.25;
+/// Length of the rounds in which settings are learnt, from the first to the last: 2¹⁸ to 2²² evaluations, or 4 to 64 a
+/// pixel where that is more.
+const FIRST_ROUND: u64 = 1 << 18;
+const FIRST_ROUND_A_PIXEL: u64 = 4;
+const LEARNING_ROUNDS: u32 = 5;
+/// Replicas where their number is free, at most.
+const MOST_AUTOMATIC: usize = 8;
+/// Lanes that are evaluated together; a ladder longer than that is cut into parts.
+const LANES_A_PART: usize = 512;
+/// Rungs are placed anew where the rejections that the density of states predicts differ by more.
+const UNEQUAL_REJECTION: f64 = 0.05;
+/// Uniform points that a chain should take over a sweep, if offers are to be had: it then forgets its past as fast as
+/// it can make use of.
+const OFFERS_TAKEN: f64 = 0.5;
+/// What an evaluation costs beside its rays, in rays: random numbers, shading, recording (benches/mutations.rs: half of
+/// the time of paths with some eight rays is spent outside Embree).
+const COST_BESIDE_RAYS: f64 = 6.0;
+
+/// Replica exchange at work on one target.
+pub struct Sampler<W> {
+    rng: Rng,
+    choices: Choices,
+    screen: Screen,
+    plan: Plan,
+    portions: Vec<Portion<W>>,
+    round: Round,
+    schedule: Schedule,
+    /// Magnitude of c, fixed when chains start.
+    ln_unit: f64,
+    offers: usize,
+    /// The part of the film's weight that each pixel has got, in evaluations.
+    effort: f64,
+    /// States of chains on each rung so far, pilot rounds included.
+    states_a_rung: u64,
+    evaluations: u64,
+    wanted: Option<u64>,
+    non_finite: u64,
+    rays: u64,
+    latest: Option<Learnt>,
+}
+
+/// The film and all that belongs to it.
+struct Screen {
+    footprint: Footprint,
+    size: [u32; 2],
+    film: Accumulator,
+    unit: f64,
+    layers: Layers,
+    map: ProbeMap,
+    probes: Option<Probes>,
+}
+
+/// One block of ladders and one of independent points, with what they saw.
+struct Portion<W> {
+    uniform: Independent<W>,
+    tally: Tally,
+    ladders: Option<Block<W>>,
+    /// What ladders saw that are given up.
+    past: Vec<Histogram>,
+    starts: Vec<Start>,
+}
+
+/// Where the run stands among its rounds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Schedule {
+    /// Number of the round; 0 has uniform points only.
+    round: u32,
+    /// Sweeps of the round, and those done.
+    length: u64,
+    done: u64,
+    /// Independent points of a block in each sweep, beside its ladders.
+    points: usize,
+    /// Nothing is learnt any more.
+    frozen: bool,
+    /// Evaluations before settings were frozen.
+    learning: u64,
+}
+
+/// What is known at the end of a round.
+pub struct Learnt {
+    /// ln Z of every rung, and c.
+    pub normalisers: Normalisers,
+    /// c from uniform points alone.
+    pub uniform: Estimate,
+    /// How g is spread over the cube.
+    pub density: Option<DensityOfStates>,
+}
+
+/// What a run of replica exchange is about, beside what is sampled.
+pub struct Setup {
+    /// Random numbers.
+    pub rng: Rng,
+    /// What was chosen.
+    pub choices: Choices,
+    /// From film positions to pixels.
+    pub footprint: Footprint,
+    /// Width and height of the film in pixels.
+    pub size: [u32; 2],
+    /// Typical magnitude of the brightest f.
+    pub unit: f64,
+    /// Evaluations to go through; without end where absent.
+    pub evaluations: Option<u64>,
+}
+
+impl<W: Default + Send> Sampler<W> {
+    /// Ready to start.
+    pub fn new(setup: Setup) -> Sampler<W> {
+        let Setup { rng, choices, footprint, size, unit, evaluations } = setup;
+        let plan = Plan::new(evaluations, 1);
+        let most_rungs = match &choices.ladder {
+            LadderChoice::Auto => MOST_AUTOMATIC,
+            LadderChoice::Replicas(k) => *k as usize,
+            LadderChoice::Betas(betas) => betas.len(),
+        };
+        let layers = layers(&choices, most_rungs);
+        let map = ProbeMap::new(size);
+        let learns = choices.combine == Combine::Balance && most_rungs > 1;
+        let screen = Screen {
+            footprint,
+            size,
+            film: Accumulator::new(size[0], size[1], layers.count, unit),
+            unit,
+            layers,
+            probes: learns.then(|| Probes::new(&map, unit)),
+            map,
+        };
+        let portion = |number: usize| Portion {
+            uniform: Independent::new(rng, (number, plan.blocks), size),
+            tally: Tally::new(1, layers.count),
+            ladders: None,
+            past: Vec::new(),
+            starts: Vec::new(),
+        };
+        let a_sweep = (plan.blocks * plan.lanes()) as u64;
+        let only_uniform = most_rungs == 1;
+        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 16.0).div_ceil(a_sweep) };
+        Sampler {
+            rng,
+            screen,
+            portions: (0..plan.blocks).map(portion).collect(),
+            round: Round {
+                ladder: Ladder::uniform(),
+                weights: Weights::uniform_alone(),
+                mixes: vec![StepMix::kelemen()],
+                effort: [1.0, 0.0],
+                half: u64::MAX,
+            },
+            schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },
+            plan,
+            choices,
+            ln_unit: 0.0,
+            offers: 0,
+            effort: 0.0,
+            states_a_rung: 0,
+            evaluations: 0,
+            wanted: evaluations,
+            rays: 0,
+            non_finite: 0,
+            latest: None,
+        }
+    }
+
+    /// Evaluations so far.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    /// Sweeps that are left of the budget, as long as sweeps are now; none without a budget.
+    pub fn sweeps_left(&self) -> Option<u64> {
+        self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations).div_ceil(self.a_sweep()))
+    }
+
+    /// Evaluations of a sweep.
+    fn a_sweep(&self) -> u64 {
+        let ladders: usize = self.portions.iter().flat_map(|portion| &portion.ladders).map(Block::lanes).sum();
+        (ladders + self.portions.len() * self.schedule.points) as u64
+    }
+
+    /// Goes through `sweeps` more sweeps, or what is left of the budget, in parallel over blocks. All state is a
+    /// function of the job and the evaluations done, never of the threads or of how sweeps were sliced.
+    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, mut sweeps: u64) {
+        while sweeps > 0 && self.sweeps_left() != Some(0) {
+            if self.schedule.done == self.schedule.length {
+                self.end_round(target);
+            }
+            let now = sweeps.min(self.schedule.length - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
+            self.work(target, now);
+            sweeps -= now;
+        }
+    }
+
+    /// Sweeps within a round.
+    fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
+        let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
+        let keeps = schedule.round == 0 && !schedule.frozen;
+        self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
+            let canvas = screen.canvas();
+            let Portion { uniform, tally, ladders, starts, .. } = portion;
+            for _ in 0..sweeps {
+                if let Some(block) = ladders {
+                    block.advance(target, 1, &canvas, round);
+                }
+                let keep = |start: Start| {
+                    if keeps {
+                        starts.push(start);
+                    }
+                };
+                uniform.sweep(target, schedule.points, &canvas, round, tally, keep);
+            }
+            tally.deposit(&canvas, number);
+            if let Some(block) = ladders {
+                block.deposit(&canvas, number);
+            }
+        });
+        let evaluations = sweeps * self.a_sweep();
+        self.evaluations += evaluations;
+        self.effort += evaluations as f64;
+        self.schedule.done += sweeps;
+        self.states_a_rung += sweeps * self.ladders();
+    }
+
+    /// Ladders at work.
+    fn ladders(&self) -> u64 {
+        self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.ladders_a_block() as u64
+    }
+}

@@ -1,0 +1,182 @@
+//! What one thread records while it works: statistics, splats, probes. Sums are of integers or kept in lists, so
+//! nothing depends on how work was cut up.
+
+use super::{
+    Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
+    steps::{SCALES, StepCount},
+};
+use crate::{
+    chain::Recorder,
+    film::{Accumulator, Footprint, Splats},
+    path::Contribution,
+};
+
+/// Layers of the film, those that the settings need. Others cost nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layers {
+    /// f of uniform points: the uniform rung's own image E_u.
+    pub uniform: Option<usize>,
+    /// What uniform points add to the balanced image.
+    pub hot: Option<usize>,
+    /// What tempered states add to the balanced image, in the unit of [`Weights`].
+    pub tempered: Option<usize>,
+    /// f/g of states on the target: the target's own image E_e, in the unit of [`Weights`].
+    pub target: Option<usize>,
+    /// The first of K − 1 layers with the parts of `tempered` by rung.
+    pub rungs: Option<usize>,
+    /// Number of layers.
+    pub count: usize,
+}
+
+/// The film that blocks record to, and its probes.
+pub struct Canvas<'a> {
+    /// Which pixels a film position goes to.
+    pub footprint: &'a Footprint,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The film.
+    pub film: &'a Accumulator,
+    /// What its layers hold.
+    pub layers: Layers,
+    /// Probes, while there is something to learn.
+    pub probes: Option<(&'a ProbeMap, &'a Probes)>,
+}
+
+impl Canvas<'_> {
+    /// The probe at a film position.
+    #[inline(always)]
+    fn probe(&self, point: &Contribution) -> Option<u32> {
+        let (map, _) = self.probes?;
+        let [x, y] = [0, 1].map(|i| {
+            let extent = self.size[i];
+            ((point.film[i] * extent as f32) as u32).min(extent - 1)
+        });
+        map.of_pixel(y * self.size[0] + x)
+    }
+}
+
+/// What all blocks do in one round; fixed within it.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// The rungs.
+    pub ladder: Ladder,
+    /// How samples enter the image.
+    pub weights: Weights,
+    /// How chains move, by rung; the first entry is unused.
+    pub mixes: Vec<StepMix>,
+    /// Weight on the film of a uniform point and of a state, by which rounds count in proportion to their length
+    /// whatever their share of uniform points is.
+    pub effort: [f64; 2],
+    /// Sweep of the ladders at which the second half of the round begins.
+    pub half: u64,
+}
+
+/// Counts of one tempered rung.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RungCounts {
+    /// Small steps by scale.
+    pub steps: [StepCount; SCALES],
+    /// Swaps with the next hotter rung.
+    pub swaps: StepCount,
+    /// Σ of ln g and weight of states in the two halves of the round.
+    pub halves: [[f64; 2]; 2],
+    /// Luminance that went to the balanced image, in the unit of the weights.
+    pub luminance: f64,
+    /// Most steps in a row that a chain refused.
+    pub longest_rejection: u32,
+}
+
+impl RungCounts {
+    /// Adds another part's counts.
+    pub fn add(&mut self, other: &RungCounts) {
+        self.steps.iter_mut().zip(other.steps).for_each(|(a, b)| *a += b);
+        self.swaps += other.swaps;
+        self.halves.as_flattened_mut().iter_mut().zip(other.halves.as_flattened()).for_each(|(a, b)| *a += b);
+        self.luminance += other.luminance;
+        self.longest_rejection = self.longest_rejection.max(other.longest_rejection);
+    }
+}
+
+/// What was seen since it was last emptied.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    /// ln g by rung: of uniform points first, then of states with their expected weights.
+    pub histograms: Vec<Histogram>,
+    /// Counts by rung; of the uniform rung only the luminance.
+    pub counts: Vec<RungCounts>,
+    /// Splats not yet on the film.
+    pub splats: Splats,
+    probes: Splats,
+}
+
+impl Tally {
+    /// For a ladder of `rungs` and a film of `layers`.
+    pub fn new(rungs: usize, layers: usize) -> Tally {
+        Tally {
+            histograms: vec![Histogram::default(); rungs],
+            counts: vec![RungCounts::default(); rungs],
+            splats: Splats::new(layers),
+            probes: Probes::splats(),
+        }
+    }
+
+    /// Records an independent sample; the film counts dark ones too.
+    #[inline(always)]
+    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution) {
+        self.histograms[0].add(point.ln_g, 1.0);
+        let mixture = if point.is_dark() { 0.0 } else { round.weights.mixture(point.ln_g) };
+        let size = canvas.size.map(|n| n as f32);
+        let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
+        if let Some(layer) = canvas.layers.uniform {
+            recorder.splat(layer, point, 1.0, 1.0);
+        }
+        if let Some(layer) = canvas.layers.hot {
+            let [effort, _] = round.effort;
+            let share = effort * round.weights.uniform(mixture);
+            recorder.splat(layer, point, share, effort);
+            self.counts[0].luminance += share * point.g();
+        }
+        if let Some(probe) = canvas.probe(point) {
+            let g = point.g();
+            Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
+        }
+    }
+
+    /// Records a state on tempered rung `k`, counted from 1, with its expected weight.
+    #[inline(always)]
+    pub fn state(&mut self, canvas: &Canvas, round: &Round, k: usize, state: &Contribution, weight: f64) {
+        self.histograms[k].add(state.ln_g, weight);
+        let size = canvas.size.map(|n| n as f32);
+        let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
+        if let Some(layer) = canvas.layers.target.filter(|_| k + 1 == round.ladder.rungs()) {
+            recorder.splat(layer, state, round.weights.target(state.ln_g) * weight, weight);
+        }
+        let Some(layer) = canvas.layers.tempered else { return };
+        let mixture = round.weights.mixture(state.ln_g);
+        let [_, effort] = round.effort;
+        let value = effort * weight * round.weights.tempered(mixture);
+        recorder.splat(layer, state, value, effort * weight);
+        if let Some(first) = canvas.layers.rungs {
+            recorder.splat(first + k - 1, state, value, effort * weight);
+        }
+        self.counts[k].luminance += value * state.g();
+        if let Some(probe) = canvas.probe(state) {
+            let g = state.g() * weight;
+            Probes::tempered(&mut self.probes, probe, |ratio| g * round.weights.tempered_with(ratio, mixture));
+        }
+    }
+
+    /// Puts what was splatted onto the film; `block` is the number of the block that it came from.
+    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
+        canvas.film.deposit(&mut self.splats);
+        match canvas.probes {
+            Some((_, probes)) => probes.deposit(block, &mut self.probes),
+            None => self.probes.clear(),
+        }
+    }
+
+    /// Empties the counts of a round.
+    pub fn reset_counts(&mut self) {
+        self.counts.fill(RungCounts::default());
+    }
+}
