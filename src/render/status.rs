@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::output::Picture;
 use super::settings::Settings;
+use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -118,6 +119,9 @@ pub trait Observer: Sync {
 
     /// Some blocks later; as often as it comes handy to the render loop.
     fn progress(&self, _status: &Status) {}
+
+    /// A round is over; follows the [`progress`](Observer::progress) of the moment in which that was noticed.
+    fn round(&self, _report: &RoundReport) {}
 
     /// Whether [`snapshot`](Observer::snapshot) should follow, for which a picture has to be made.
     fn wants_picture(&self, _status: &Status) -> bool {
