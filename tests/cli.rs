@@ -73,6 +73,11 @@ fn budgets_are_above_zero() {
 }
 
 #[test]
+fn a_run_is_quiet_or_verbose() {
+    refused(&["-q", "-v"], &["--quiet and --verbose: give one of them"]);
+}
+
+#[test]
 fn machines_have_limits() {
     refused(&["--threads", "0"], &["--threads 0", "1 to 4096"]);
     refused(&["--threads", "-1"], &["--threads"]);

@@ -12,12 +12,13 @@ use super::failure::Failure;
 use super::scene::SceneArguments;
 use super::{signals, values};
 use crate::render::log::{self, Log};
-use crate::render::progress::Progress;
+use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
     self, Combine, Job, LadderChoice, Method, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status,
     Summary,
 };
+use crate::tempering::RoundReport;
 
 /// Renders a scene to an OpenEXR image with a PNG preview
 #[derive(Args)]
@@ -42,6 +43,10 @@ pub(super) struct Render {
     /// Shows nothing but errors
     #[arg(short, long, help_heading = "Files")]
     quiet: bool,
+
+    /// Shows a table of the rounds of --method re: barrier, swaps, round trips, normalisation, and what was chosen
+    #[arg(short, long, help_heading = "Files")]
+    verbose: bool,
 
     /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
     #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
@@ -93,7 +98,7 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let opened = arguments.scene.open()?;
     let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
-    let progress = Progress::new(arguments.quiet, stop.clone());
+    let progress = Progress::new(arguments.verbosity(), stop.clone());
     for warning in &opened.warnings {
         progress.say(&format!("warning: {warning}"));
     }
@@ -114,6 +119,14 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
 }
 
 impl Render {
+    fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
+        }
+    }
+
     /// The run that is asked for, or everything that is wrong with it.
     fn settings(&self) -> Result<Settings, Failure> {
         let no_budget = self.mpp.is_none() && self.time.is_none();
@@ -140,6 +153,9 @@ impl Render {
     /// What is wrong with the options beside one another, which the settings no longer tell.
     fn contradictions(&self) -> Vec<String> {
         let mut faults = self.scene.faults();
+        if self.quiet && self.verbose {
+            faults.push("--quiet and --verbose: give one of them".into());
+        }
         if self.betas.is_some() && self.replicas.is_some() {
             faults.push("--betas and --replicas: give one of them; the number of replicas is that of the betas".into());
         }
@@ -226,6 +242,11 @@ impl Observer for Audience<'_> {
     fn progress(&self, status: &Status) {
         self.progress.progress(status);
         self.log.iter().for_each(|log| log.progress(status));
+    }
+
+    fn round(&self, report: &RoundReport) {
+        self.progress.round(report);
+        self.log.iter().for_each(|log| log.round(report));
     }
 
     fn wants_picture(&self, status: &Status) -> bool {

@@ -1,6 +1,7 @@
 //! Where a run stands, and who wants to know.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -66,6 +67,8 @@ pub struct Status {
     pub non_finite: u64,
     /// The estimate of c = ∫ g and its standard error, once there is one.
     pub normalisation: Option<(f64, f64)>,
+    /// The last round that ended; absent before that, and for methods without rounds.
+    pub last_round: Option<Arc<RoundReport>>,
 }
 
 impl Status {
