@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::settings::Method;
 use super::status::{RunStart, Status};
 use crate::film::file::{FileError, check_writable};
 use crate::film::{Image, Plane, Value, exr_file, png_file};
@@ -62,8 +63,10 @@ impl Output {
 /// What an image file says about how it was made.
 ///
 /// Texts: `scene`, `method`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
-/// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold).
-/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation` and `normalisation_error`.
+/// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold), for `mlt`
+/// `normalisation_from` and `kelemen_weights` (true or false).
+/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error` and for `mlt`
+/// `large_steps`.
 pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     let list = |numbers: &[f64]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     let mut data: Vec<(&str, Value)> = vec![
@@ -81,6 +84,12 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
         data.push(("betas", list(&start.betas).into()));
         data.push(("combine", start.settings.combine.name().into()));
     }
+    if start.settings.method == Method::Mlt {
+        let mlt = start.settings.mlt;
+        data.push(("large_steps", mlt.large_steps.into()));
+        data.push(("normalisation_from", mlt.normalisation.name().into()));
+        data.push(("kelemen_weights", mlt.kelemen_weights.to_string().into()));
+    }
     for (name, numbers) in [("acceptance", &status.acceptance), ("swap", &status.swap)] {
         if !numbers.is_empty() {
             data.push((name, list(numbers).into()));
@@ -96,6 +105,7 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Settings;
 
     #[test]
     fn the_extension_decides() {
@@ -135,5 +145,17 @@ mod tests {
         assert_eq!(value("mutations"), Some(77.0.into()));
         assert_eq!(value("normalisation_error"), Some(0.01.into()));
         assert!(output.files()[1].exists());
+    }
+
+    #[test]
+    fn what_was_chosen_about_metropolis_is_told_for_metropolis_alone() {
+        let names = ["large_steps", "normalisation_from", "kelemen_weights"];
+        let told = |method| {
+            let settings = Settings { method, ..Settings::default() };
+            let data = metadata(&RunStart { settings, ..RunStart::default() }, &Status::default());
+            names.map(|name| data.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone()))
+        };
+        assert_eq!(told(Method::Mlt), [Some(0.3.into()), Some("two-pass".into()), Some("false".into())]);
+        assert_eq!(told(Method::ReplicaExchange), [None, None, None]);
     }
 }

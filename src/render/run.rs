@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    baseline::TwoPassMlt,
+    baseline::Mlt,
     calibration,
     engine::{Engine, Stage},
     output::{Picture, metadata},
@@ -103,7 +103,7 @@ fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderErr
 pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
     match settings.method {
         Method::Path => Box::new(PathTracer::new(stage, mutations)),
-        Method::Mlt => Box::new(TwoPassMlt::new(stage, mutations)),
+        Method::Mlt => Box::new(Mlt::new(stage, &settings.mlt, mutations)),
         Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
     }
 }
