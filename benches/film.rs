@@ -1,10 +1,10 @@
-//! What a splat costs: spreading it over pixels and depositing it.
+//! What a splat costs, spreading it over pixels and depositing it, and what combining two images costs.
 
 use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use relt::film::{Accumulator, Filter, Footprint, Splat, Splats};
+use relt::film::{Accumulator, Filter, Footprint, Heuristic, Image, Splat, Splats};
 
 /// Time before and while a benchmark is measured: enough for nanoseconds.
 const WARM_UP: Duration = Duration::from_millis(200);
@@ -60,5 +60,20 @@ fn spread(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, deposit, spread);
+/// The paper's heuristics on images of 512 × 512 pixels; throughput in pixels.
+fn combine(c: &mut Criterion) {
+    let mut group = c.benchmark_group("film/combine");
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).sample_size(10);
+    const SIZE: u32 = 512;
+    group.throughput(Throughput::Elements(u64::from(SIZE * SIZE)));
+    let [uniform, target] = [1, 2].map(|image: u32| {
+        let value = |i: u32| (i.wrapping_mul(0x9E37_79B9).wrapping_mul(image) >> 8) as f32;
+        Image::new(SIZE, SIZE, (0..SIZE * SIZE).map(|i| [3 * i, 3 * i + 1, 3 * i + 2].map(value)).collect())
+    });
+    for heuristic in Heuristic::ALL {
+        group.bench_function(heuristic.name(), |b| b.iter(|| heuristic.combine(black_box(&uniform), &target)));
+    }
+}
+
+criterion_group!(benches, deposit, spread, combine);
 criterion_main!(benches);

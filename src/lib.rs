@@ -7,7 +7,8 @@
 //! The life of one mutation runs through the modules in this order: [`sample`] proposes a point, [`path`] maps
 //! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
-//! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines.
+//! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines; [`study`] draws what runs
+//! leave behind.
 //!
 //! ```standalone_crate
 //! use std::{path::Path, sync::atomic::AtomicBool};
@@ -36,4 +37,5 @@ pub mod render;
 pub mod rng;
 pub mod sample;
 pub mod scene;
+pub mod study;
 pub mod tempering;

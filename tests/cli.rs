@@ -60,6 +60,20 @@ fn a_ladder_needs_replica_exchange() {
 }
 
 #[test]
+fn large_steps_need_metropolis() {
+    for method in ["path", "re"] {
+        refused(&["--method", method, "--large-steps", "0.5"], &["--large-steps", method, "only mlt"]);
+        refused(&["--method", method, "--normalisation", "pooled"], &["--normalisation", method, "only mlt"]);
+        refused(&["--method", method, "--kelemen-weights"], &["--kelemen-weights", method, "only mlt"]);
+    }
+    for p in ["0", "1", "-0.5", "NaN"] {
+        refused(&["--method", "mlt", "--large-steps", p], &[&format!("--large-steps {p}"), "above 0", "below 1"]);
+    }
+    refused(&["--method", "mlt", "--large-steps", "often"], &["--large-steps", "often"]);
+    refused(&["--method", "mlt", "--normalisation", "none"], &["none", "two-pass", "pooled"]);
+}
+
+#[test]
 fn budgets_are_above_zero() {
     refused(&["--mpp", "0"], &["--mpp 0", "above 0"]);
     refused(&["--mpp", "-3"], &["--mpp -3", "above 0"]);
@@ -70,6 +84,11 @@ fn budgets_are_above_zero() {
     refused(&["--time", "-5s"], &["--time"]);
     refused(&["--time", "9000000h"], &["more than a year"]);
     refused(&["--snapshot", "0s"], &["--snapshot", "above 0"]);
+}
+
+#[test]
+fn a_run_is_quiet_or_verbose() {
+    refused(&["-q", "-v"], &["--quiet and --verbose: give one of them"]);
 }
 
 #[test]

@@ -9,14 +9,42 @@ use crate::{
     sample::{Move, StepLaw},
 };
 
-/// Probability of proposing a fresh point of the cube instead of a small step (Kelemen et al. 2002 use 0.25 to 0.75
-/// and report little difference; 0.3 is what their renderers' descendants ship).
+/// Probability of proposing a fresh point of the cube instead of a small step, where nothing else is asked for
+/// (Kelemen et al. 2002 use 0.25 to 0.75 and report little difference; 0.3 is what their renderers' descendants ship).
 pub const LARGE_STEP_PROBABILITY: f64 = 0.3;
+
+/// Layers of the film that a baseline records into.
+pub mod baseline_layer {
+    /// States of the chains.
+    pub const CHAINS: usize = 0;
+    /// Proposals of large steps as independent samples; there only with Kelemen's weights.
+    pub const LARGE_STEPS: usize = 1;
+}
+
+/// How often chains make large steps, and what becomes of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LargeSteps {
+    /// p, the probability that a step is a large one, in (0, 1).
+    pub probability: f64,
+    /// Whether proposals of large steps enter the image once more, as the independent uniform samples that they are.
+    ///
+    /// Of N steps, N states follow the density g/c and about p N proposals the density 1. By the balance heuristic a
+    /// sample of either kind adds f / (N g/c + p N) to the image. States then add ∫ f (g/c) / (g/c + p) on average,
+    /// proposals ∫ f p / (g/c + p), both together ∫ f. Without the proposals p is 0 in the weight, which leaves the
+    /// familiar c f/g. If a constant ζ stands in the place of c, all this stays true once the states' part is
+    /// multiplied by c/ζ; so ζ may be a first estimate of c, and a later one the factor: unbiased given c, for any ζ.
+    /// A sample adds no more than min(c f/g, f/p)/N.
+    ///
+    /// Source: Kelemen et al. 2002, section 3.4, where ζ = c is the estimate so far; Veach & Guibas 1995 (balance
+    /// heuristic).
+    pub kelemen_weights: bool,
+}
 
 /// A block of independent chains on g, started from given states.
 pub struct Baseline<W> {
     walkers: Walkers,
     evaluator: Evaluator<W>,
+    large_steps: LargeSteps,
     /// Uniform number of each lane's decision at this step.
     decisions: Vec<f64>,
     steps: u64,
@@ -24,42 +52,71 @@ pub struct Baseline<W> {
     pub small: (f64, u64),
     /// The same of large steps.
     pub large: (f64, u64),
+    /// Σ g of the proposals of large steps: over their number, an unbiased estimate of c that is independent of the
+    /// chains' first states.
+    pub large_sum: f64,
 }
 
 impl<W: Default> Baseline<W> {
     /// Chains `first_chain`, `first_chain + 1`, … put into those states by replaying them.
-    pub fn new<T: Target<Workspace = W>>(target: &T, rng: Rng, first_chain: u32, starts: &[Start]) -> Baseline<W> {
+    pub fn new<T: Target<Workspace = W>>(
+        target: &T,
+        rng: Rng,
+        first_chain: u32,
+        starts: &[Start],
+        large_steps: LargeSteps,
+    ) -> Baseline<W> {
         let counter =
             |lane: usize| Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
         let mut walkers = Walkers::new(starts.len());
         let mut evaluator = Evaluator::new(rng, (0..starts.len()).map(counter).collect());
         replay(target, starts, &mut walkers, &mut evaluator);
-        Baseline { walkers, evaluator, decisions: vec![0.0; starts.len()], steps: 0, small: (0.0, 0), large: (0.0, 0) }
-    }
-
-    /// Every chain makes `steps` steps; states go to layer 0 as `unit` · f/g.
-    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, steps: u64, unit: f64, recorder: &mut Recorder) {
-        let mut record = record_luminance_normalised(unit, recorder);
-        for _ in 0..steps {
-            self.step(target, &mut record);
+        Baseline {
+            walkers,
+            evaluator,
+            large_steps,
+            decisions: vec![0.0; starts.len()],
+            steps: 0,
+            small: (0.0, 0),
+            large: (0.0, 0),
+            large_sum: 0.0,
         }
     }
 
-    fn step<T: Target<Workspace = W>>(&mut self, target: &T, record: &mut impl FnMut(&Contribution, f64)) {
+    /// Every chain makes `steps` steps; see [`LargeSteps`] for what is recorded, in units of `unit`, the ζ of the weights.
+    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, steps: u64, unit: f64, recorder: &mut Recorder) {
+        for _ in 0..steps {
+            self.step(target, unit, recorder);
+        }
+    }
+
+    fn step<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
         for lane in 0..self.decisions.len() {
             self.evaluator.counters[lane].step = self.steps;
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
             let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
-            self.evaluator.moves[lane] = if kind < LARGE_STEP_PROBABILITY { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
+            let large = kind < self.large_steps.probability;
+            self.evaluator.moves[lane] = if large { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
-            let u = self.decisions[lane];
             let proposed = self.evaluator.out.lanes[lane];
-            let alpha = self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, record);
-            let count = if self.evaluator.moves[lane] == Move::Fresh { &mut self.large } else { &mut self.small };
+            let small = self.evaluator.moves[lane] != Move::Fresh;
+            if !small {
+                self.large_sum += proposed.g();
+                if self.large_steps.kelemen_weights && !proposed.is_dark() {
+                    self.large_steps.record(baseline_layer::LARGE_STEPS, &proposed, 1.0, unit, recorder);
+                }
+            }
+            let u = self.decisions[lane];
+            let large_steps = self.large_steps;
+            let alpha =
+                self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, &mut |state, weight| {
+                    large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
+                });
+            let count = if small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
         }
         self.steps += 1;
@@ -67,10 +124,9 @@ impl<W: Default> Baseline<W> {
 
     /// Records what the current states have gathered, without changing them.
     pub fn record_pending(&self, unit: f64, recorder: &mut Recorder) {
-        let mut record = record_luminance_normalised(unit, recorder);
         for (state, &weight) in self.walkers.states.iter().zip(&self.walkers.pending) {
             if weight > 0.0 {
-                record(state, weight);
+                self.large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
             }
         }
     }
@@ -86,7 +142,15 @@ impl<W: Default> Baseline<W> {
     }
 }
 
-/// Records f/g · weight · `unit` in layer 0.
-fn record_luminance_normalised(unit: f64, recorder: &mut Recorder) -> impl FnMut(&Contribution, f64) {
-    move |state, weight| recorder.splat(0, state, unit * weight / state.g(), weight)
+impl LargeSteps {
+    /// Layers of the film that are recorded into.
+    pub fn layers(&self) -> usize {
+        1 + usize::from(self.kelemen_weights)
+    }
+
+    /// Records f · weight / (g/ζ + p) with ζ = `unit`; without Kelemen's weights p counts as 0.
+    fn record(&self, layer: usize, state: &Contribution, weight: f64, unit: f64, recorder: &mut Recorder) {
+        let uniform_share = if self.kelemen_weights { self.probability } else { 0.0 };
+        recorder.splat(layer, state, unit * weight / (state.g() + uniform_share * unit), weight);
+    }
 }

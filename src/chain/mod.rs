@@ -7,7 +7,7 @@ mod start;
 mod target;
 mod walkers;
 
-pub use baseline::{Baseline, LARGE_STEP_PROBABILITY};
+pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, baseline_layer};
 pub use metropolis::acceptance;
 pub use recorder::Recorder;
 pub use start::{Start, replay, resample};

@@ -2,6 +2,7 @@
 
 mod failure;
 mod info;
+mod ladder;
 mod render;
 mod scene;
 mod signals;
@@ -24,6 +25,7 @@ struct Arguments {
 enum Command {
     Render(render::Render),
     Info(info::Info),
+    Ladder(ladder::Ladder),
 }
 
 const EXIT_CODES: &str = "\
@@ -46,6 +48,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.command {
         Command::Render(arguments) => render::run(arguments),
         Command::Info(arguments) => info::run(arguments),
+        Command::Ladder(arguments) => ladder::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

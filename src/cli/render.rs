@@ -12,12 +12,13 @@ use super::failure::Failure;
 use super::scene::SceneArguments;
 use super::{signals, values};
 use crate::render::log::{self, Log};
-use crate::render::progress::Progress;
+use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, Method, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status,
-    Summary,
+    self, Combine, Job, LadderChoice, Method, MltSettings, Normalisation, Observer, Output, PacketChoice, Picture,
+    RunStart, Settings, Status, Summary,
 };
+use crate::tempering::RoundReport;
 
 /// Renders a scene to an OpenEXR image with a PNG preview
 #[derive(Args)]
@@ -43,6 +44,10 @@ pub(super) struct Render {
     #[arg(short, long, help_heading = "Files")]
     quiet: bool,
 
+    /// Shows a table of the rounds of --method re: barrier, swaps, round trips, normalisation, and what was chosen
+    #[arg(short, long, help_heading = "Files")]
+    verbose: bool,
+
     /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
     #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
     method: Method,
@@ -59,6 +64,19 @@ pub(super) struct Render {
     /// [default: balance]
     #[arg(long, value_parser = values::combine(), help_heading = "Method")]
     combine: Option<Combine>,
+
+    /// Probability of a large step for --method mlt, between 0 and 1 [default: 0.3]
+    #[arg(long, value_name = "P", allow_negative_numbers = true, help_heading = "Method")]
+    large_steps: Option<f64>,
+
+    /// Samples that --method mlt takes the mean luminance from; two-pass: those before the chains start; pooled: those
+    /// and all large steps [default: two-pass]
+    #[arg(long, value_parser = values::normalisation(), help_heading = "Method")]
+    normalisation: Option<Normalisation>,
+
+    /// Lets --method mlt use large steps in the image also as independent samples, by Kelemen's weights
+    #[arg(long, help_heading = "Method")]
+    kelemen_weights: bool,
 
     /// Mutations per pixel, above 0; the same seed and number give the same image, bit by bit
     /// [default: 64 unless --time is given; with both, whichever ends first]
@@ -93,7 +111,7 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let opened = arguments.scene.open()?;
     let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
-    let progress = Progress::new(arguments.quiet, stop.clone());
+    let progress = Progress::new(arguments.verbosity(), stop.clone());
     for warning in &opened.warnings {
         progress.say(&format!("warning: {warning}"));
     }
@@ -114,6 +132,14 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
 }
 
 impl Render {
+    fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
+        }
+    }
+
     /// The run that is asked for, or everything that is wrong with it.
     fn settings(&self) -> Result<Settings, Failure> {
         let no_budget = self.mpp.is_none() && self.time.is_none();
@@ -130,6 +156,11 @@ impl Render {
                 (None, None) => LadderChoice::default(),
             },
             combine: self.combine.unwrap_or_default(),
+            mlt: MltSettings {
+                large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
+                normalisation: self.normalisation.unwrap_or_default(),
+                kelemen_weights: self.kelemen_weights,
+            },
             packet: self.packet,
         };
         let mut faults = self.contradictions();
@@ -140,6 +171,9 @@ impl Render {
     /// What is wrong with the options beside one another, which the settings no longer tell.
     fn contradictions(&self) -> Vec<String> {
         let mut faults = self.scene.faults();
+        if self.quiet && self.verbose {
+            faults.push("--quiet and --verbose: give one of them".into());
+        }
         if self.betas.is_some() && self.replicas.is_some() {
             faults.push("--betas and --replicas: give one of them; the number of replicas is that of the betas".into());
         }
@@ -152,6 +186,16 @@ impl Render {
             let method = self.method.name();
             let given = of_a_ladder.iter().filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
+        }
+        let of_large_steps = [
+            ("--large-steps", self.large_steps.is_some()),
+            ("--normalisation", self.normalisation.is_some()),
+            ("--kelemen-weights", self.kelemen_weights),
+        ];
+        if self.method != Method::Mlt {
+            let method = self.method.name();
+            let given = of_large_steps.iter().filter(|(_, given)| *given);
+            faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no large steps; only mlt has")));
         }
         let cores = available_parallelism().map_or(1, usize::from);
         if let Some(threads) = self.threads.filter(|threads| self.pin && *threads > cores) {
@@ -228,6 +272,11 @@ impl Observer for Audience<'_> {
         self.log.iter().for_each(|log| log.progress(status));
     }
 
+    fn round(&self, report: &RoundReport) {
+        self.progress.round(report);
+        self.log.iter().for_each(|log| log.round(report));
+    }
+
     fn wants_picture(&self, status: &Status) -> bool {
         self.snapshots.as_ref().is_some_and(|snapshots| snapshots.is_due(status.elapsed))
     }
@@ -285,11 +334,15 @@ mod tests {
             time: Some(Duration::from_secs(300)),
             ladder: LadderChoice::Betas(vec![0.0, 0.25, 1.0]),
             combine: Combine::Target,
+            mlt: MltSettings::default(),
             packet: PacketChoice::Auto,
         };
         assert_eq!(settings(&given), Ok(expected));
         let mlt = settings(&["--method", "mlt", "--packet", "8", "--replicas"][..4]).unwrap();
         assert_eq!((mlt.method, mlt.packet), (Method::Mlt, PacketChoice::Fixed(crate::embree::Width::W8)));
+        let given = "--method mlt --large-steps 0.5 --normalisation pooled --kelemen-weights";
+        let expected = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
+        assert_eq!(settings(&given.split(' ').collect::<Vec<_>>()).unwrap().mlt, expected);
         assert_eq!(settings(&["--replicas", "6"]).unwrap().ladder, LadderChoice::Replicas(6));
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::embree::Width;
-use crate::render::{Combine, Method, PacketChoice};
+use crate::render::{Combine, Method, Normalisation, PacketChoice};
 
 /// `name=value`.
 pub(super) fn define(text: &str) -> Result<(String, String), String> {
@@ -37,6 +37,10 @@ pub(super) fn method() -> impl TypedValueParser<Value = Method> {
 
 pub(super) fn combine() -> impl TypedValueParser<Value = Combine> {
     one_of(&Combine::ALL, |combine| combine.name())
+}
+
+pub(super) fn normalisation() -> impl TypedValueParser<Value = Normalisation> {
+    one_of(&Normalisation::ALL, |normalisation| normalisation.name())
 }
 
 pub(super) fn packet() -> impl TypedValueParser<Value = PacketChoice> {

@@ -8,6 +8,7 @@ pub mod accumulator;
 pub mod exr_file;
 pub mod file;
 pub mod filter;
+pub mod heuristics;
 pub mod image;
 pub mod png_file;
 
@@ -15,4 +16,5 @@ pub use accumulator::{Accumulator, Splat, Splats};
 pub use exr_file::Value;
 pub use file::FileError;
 pub use filter::{Filter, Footprint};
+pub use heuristics::Heuristic;
 pub use image::{Image, Plane};

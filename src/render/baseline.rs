@@ -1,14 +1,16 @@
 //! `mlt`: the paper's two-pass baseline. First the normalisation c from M independent samples, then chains that start
-//! from states resampled among them in proportion to g; image = c/N Σ f/g.
+//! from states resampled among them in proportion to g; image = c/N Σ f/g. Settings let large steps help with c and
+//! with the image.
 
 use rayon::prelude::*;
 
 use super::{
     engine::{Counts, Development, Engine, Stage, film_warnings, layer_with, mean},
     plan::Plan,
+    settings::{MltSettings, Normalisation},
 };
 use crate::{
-    chain::{Baseline, Evaluator, Start, resample},
+    chain::{Baseline, Evaluator, LargeSteps, Start, baseline_layer, resample},
     film::{Accumulator, Plane, Splats},
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
@@ -24,14 +26,19 @@ const BOOTSTRAP_BATCH: u64 = 1024;
 const BOOTSTRAP_BATCHES: u64 = 16;
 
 /// The method at work.
-pub struct TwoPassMlt {
+pub struct Mlt {
     plan: Plan,
     film: Accumulator,
     blocks: Vec<Block>,
-    bootstrap: u64,
+    large_steps: LargeSteps,
+    pools: bool,
+    /// Σ g and number of samples of every batch of the first pass.
+    bootstrap: Vec<(f64, f64)>,
+    bootstrap_samples: u64,
     bootstrap_rays: u64,
     bootstrap_faults: u64,
-    normalisation: Estimate,
+    /// c from the first pass alone, also the magnitude that states are kept in on the film.
+    first_estimate: Estimate,
 }
 
 struct Block {
@@ -39,15 +46,15 @@ struct Block {
     splats: Splats,
 }
 
-impl TwoPassMlt {
+impl Mlt {
     /// Does the first pass and puts the chains into their first states.
-    pub fn new(stage: &Stage, mutations: Option<u64>) -> TwoPassMlt {
-        let bootstrap = mutations.map_or(BOOTSTRAP, |n| BOOTSTRAP.min(n / 2).max(1));
-        let plan = Plan::new(mutations.map(|n| n.saturating_sub(bootstrap).max(1)), 1);
-        let batches = first_pass(stage, bootstrap);
-        let groups: Vec<(f64, f64)> =
+    pub fn new(stage: &Stage, settings: &MltSettings, mutations: Option<u64>) -> Mlt {
+        let bootstrap_samples = mutations.map_or(BOOTSTRAP, |n| BOOTSTRAP.min(n / 2).max(1));
+        let plan = Plan::new(mutations.map(|n| n.saturating_sub(bootstrap_samples).max(1)), 1);
+        let large_steps = LargeSteps { probability: settings.large_steps, kelemen_weights: settings.kelemen_weights };
+        let batches = first_pass(stage, bootstrap_samples);
+        let bootstrap: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
-        let normalisation = uniform_mean(&groups);
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
         // a black scene has no state to start from: no chains, a black image
         let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
@@ -55,24 +62,44 @@ impl TwoPassMlt {
             .par_chunks(plan.lanes())
             .enumerate()
             .map(|(i, starts)| Block {
-                chains: Baseline::new(&stage.mapping, stage.rng, (i * plan.lanes()) as u32, starts),
-                splats: Splats::new(1),
+                chains: Baseline::new(&stage.mapping, stage.rng, (i * plan.lanes()) as u32, starts, large_steps),
+                splats: Splats::new(large_steps.layers()),
             })
             .collect();
-        TwoPassMlt {
+        Mlt {
             plan,
-            film: stage.accumulator(1),
+            film: stage.accumulator(large_steps.layers()),
             blocks,
-            bootstrap,
+            large_steps,
+            pools: settings.normalisation == Normalisation::Pooled,
+            bootstrap_samples,
             bootstrap_rays: batches.iter().map(|b| b.rays).sum(),
             bootstrap_faults: batches.iter().map(|b| b.faults).sum(),
-            normalisation,
+            first_estimate: uniform_mean(&bootstrap),
+            bootstrap,
         }
     }
 
-    /// The magnitude that states are kept in on the film: c itself.
+    /// The magnitude that states are kept in on the film: c as it is known before any step.
     fn unit(&self) -> f64 {
-        self.normalisation.value
+        self.first_estimate.value
+    }
+
+    /// c from all samples that the settings admit.
+    ///
+    /// Pooled, a block's large steps and its share of the first pass's batches are one group: so groups are about
+    /// equal, as the standard error between them supposes.
+    fn normalisation(&self) -> Estimate {
+        if !self.pools || self.blocks.is_empty() {
+            return self.first_estimate;
+        }
+        let mut groups: Vec<(f64, f64)> =
+            self.blocks.iter().map(|block| (block.chains.large_sum, block.chains.large.1 as f64)).collect();
+        for (i, batch) in self.bootstrap.iter().enumerate() {
+            let group = &mut groups[i % self.blocks.len()];
+            *group = (group.0 + batch.0, group.1 + batch.1);
+        }
+        uniform_mean(&groups)
     }
 }
 
@@ -107,13 +134,13 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
         .collect()
 }
 
-impl Engine for TwoPassMlt {
+impl Engine for Mlt {
     fn sweeps_wanted(&self) -> Option<u64> {
         if self.blocks.is_empty() { Some(0) } else { self.plan.sweeps }
     }
 
     fn mutations_wanted(&self) -> Option<u64> {
-        self.sweeps_wanted().map(|s| s * self.plan.a_sweep() + self.bootstrap)
+        self.sweeps_wanted().map(|s| s * self.plan.a_sweep() + self.bootstrap_samples)
     }
 
     fn advance(&mut self, stage: &Stage, sweeps: u64) {
@@ -126,7 +153,7 @@ impl Engine for TwoPassMlt {
 
     fn counts(&self) -> Counts {
         let mut counts = Counts {
-            mutations: self.bootstrap,
+            mutations: self.bootstrap_samples,
             rays: self.bootstrap_rays,
             non_finite: self.bootstrap_faults,
             ..Counts::default()
@@ -145,18 +172,28 @@ impl Engine for TwoPassMlt {
         counts
     }
 
+    /// Image = pixels/N · (ĉ/ζ Σ CHAINS + Σ LARGE_STEPS) with ζ the first estimate of c.
     fn develop(&self, stage: &Stage) -> Development {
-        let mut splats = Splats::new(1);
+        let mut splats = Splats::new(self.large_steps.layers());
         for block in &self.blocks {
             block.chains.record_pending(self.unit(), &mut stage.recorder(&mut splats));
         }
-        let sums = layer_with(&self.film, &splats, 0);
+        let mut sums = layer_with(&self.film, &splats, baseline_layer::CHAINS);
+        let normalisation = self.normalisation();
+        if self.pools && self.unit() > 0.0 {
+            let later = normalisation.value / self.unit();
+            sums.iter_mut().flat_map(|sum| &mut sum[..3]).for_each(|value| *value *= later);
+        }
+        if self.large_steps.kelemen_weights {
+            let proposals = layer_with(&self.film, &splats, baseline_layer::LARGE_STEPS);
+            sums.iter_mut().flatten().zip(proposals.iter().flatten()).for_each(|(sum, value)| *sum += value);
+        }
         let steps: u64 = self.blocks.iter().map(|b| b.chains.mutations()).sum();
         let scale = if steps > 0 { stage.pixels() as f64 / steps as f64 } else { 0.0 };
         Development {
             image: stage.image(|i| [0, 1, 2].map(|channel| sums[i][channel] * scale)),
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
-            normalisation: Some(self.normalisation),
+            normalisation: Some(normalisation),
             warnings: film_warnings(&self.film),
         }
     }

@@ -5,7 +5,7 @@ use crate::{
     film::{Accumulator, Footprint, Image, Plane, Splats},
     path::unidirectional::Mapping,
     rng::Rng,
-    tempering::Estimate,
+    tempering::{Estimate, RoundReport},
 };
 
 /// What all blocks of a run share.
@@ -91,6 +91,10 @@ pub trait Engine: Send {
     fn counts(&self) -> Counts;
     /// The picture so far; changes nothing.
     fn develop(&self, stage: &Stage) -> Development;
+    /// Reports of the rounds that ended since this was last called, in order; none where there are no rounds.
+    fn take_reports(&mut self) -> Vec<RoundReport> {
+        Vec::new()
+    }
 }
 
 /// Σ rgb and Σ weight of every pixel of a layer, with splats that are not on the film yet.

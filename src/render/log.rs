@@ -1,7 +1,8 @@
 //! The run log: one JSON object a line, each with its `event`.
 //!
-//! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `run_end`
-//! the same at the end, with the files written. Times are seconds, rates are probabilities. A line is on its way to
+//! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `round` what a
+//! round of replica exchange came to ([`RoundReport`]); `run_end` the same as a snapshot at the end, with the files
+//! written. Times are seconds, rates are probabilities. A line is on its way to
 //! the disk once its event is over, so the log of a run that was killed is complete up to then.
 
 use std::fs::{File, OpenOptions};
@@ -16,6 +17,7 @@ use serde::Serialize;
 use super::output::Picture;
 use super::status::{Observer, RunStart, Status, Summary};
 use crate::film::file::{FileError, check_writable};
+use crate::tempering::RoundReport;
 
 /// Finds out now whether a log can be written to `path`; leaves it as it is.
 pub fn check(path: &Path) -> Result<(), FileError> {
@@ -38,6 +40,8 @@ struct State {
     file: Box<dyn Write + Send>,
     /// When the next snapshot line is due.
     due: Duration,
+    /// The wall time that was last heard of.
+    elapsed: Duration,
     /// The first failure; nothing is written after it.
     failed: Option<io::Error>,
 }
@@ -54,7 +58,7 @@ impl Log {
 
     /// A log to anything that can be written to.
     pub fn new(file: impl Write + Send + 'static) -> Log {
-        let state = State { file: Box::new(file), due: SHORTEST_GAP, failed: None };
+        let state = State { file: Box::new(file), due: SHORTEST_GAP, elapsed: Duration::ZERO, failed: None };
         Log { state: Mutex::new(state) }
     }
 
@@ -95,10 +99,17 @@ impl Observer for Log {
 
     fn progress(&self, status: &Status) {
         let mut state = self.state();
+        state.elapsed = status.elapsed;
         if status.elapsed >= state.due {
             state.due = status.elapsed + SHORTEST_GAP.max(status.elapsed / 4);
             state.line(&Event::Snapshot { now: status.into(), image_written: false });
         }
+    }
+
+    fn round(&self, report: &RoundReport) {
+        let mut state = self.state();
+        let seconds = state.elapsed.as_secs_f64();
+        state.line(&Event::Round { seconds, report });
     }
 
     fn snapshot(&self, status: &Status, _picture: &Picture) {
@@ -132,6 +143,12 @@ enum Event<'a> {
         now: Now<'a>,
         /// An image of this moment was made as well.
         image_written: bool,
+    },
+    Round {
+        /// Wall time since rendering began when the end of the round was noticed.
+        seconds: f64,
+        #[serde(flatten)]
+        report: &'a RoundReport,
     },
     RunEnd {
         #[serde(flatten)]
@@ -315,6 +332,25 @@ mod tests {
         if cfg!(target_os = "linux") {
             assert!(end["cpu_seconds"].as_f64() >= Some(0.0));
         }
+    }
+
+    #[test]
+    fn rounds_read_back() {
+        let file = Shared::default();
+        let log = Log::new(file.clone());
+        let report = RoundReport {
+            round: 3,
+            betas: vec![0.0, 0.1, 1.0],
+            ln_z: vec![0.0, f64::NAN, -2.5],
+            choices: vec!["4 replicas, for Λ is 1.4".into()],
+            ..RoundReport::default()
+        };
+        log.progress(&status(7));
+        log.round(&report);
+        let line = lines(&file).pop().unwrap();
+        assert_eq!((&line["event"], &line["seconds"], &line["round"]), (&"round".into(), &7.0.into(), &3.into()));
+        let read: RoundReport = serde_json::from_value(line).unwrap();
+        assert_eq!(format!("{read:?}"), format!("{report:?}"), "as texts, for NaN equals nothing");
     }
 
     #[test]

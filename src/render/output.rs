@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use super::settings::Method;
 use super::status::{RunStart, Status};
 use crate::film::file::{FileError, check_writable};
 use crate::film::{Image, Plane, Value, exr_file, png_file};
+use crate::tempering::{Normaliser, RoundReport, RungReport};
 
 /// An image with all that goes into its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,10 +64,12 @@ impl Output {
 /// What an image file says about how it was made.
 ///
 /// Texts: `scene`, `method`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
-/// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold).
-/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation` and `normalisation_error`.
+/// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold), for `mlt`
+/// `normalisation_from` and `kelemen_weights` (true or false).
+/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error` and for `mlt`
+/// `large_steps`.
+/// Of the last round of replica exchange, with the meanings in [`RoundReport`]: see [`ladder`].
 pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
-    let list = |numbers: &[f64]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     let mut data: Vec<(&str, Value)> = vec![
         ("scene", start.scene.as_str().into()),
         ("method", start.settings.method.name().into()),
@@ -81,6 +85,12 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
         data.push(("betas", list(&start.betas).into()));
         data.push(("combine", start.settings.combine.name().into()));
     }
+    if start.settings.method == Method::Mlt {
+        let mlt = start.settings.mlt;
+        data.push(("large_steps", mlt.large_steps.into()));
+        data.push(("normalisation_from", mlt.normalisation.name().into()));
+        data.push(("kelemen_weights", mlt.kelemen_weights.to_string().into()));
+    }
     for (name, numbers) in [("acceptance", &status.acceptance), ("swap", &status.swap)] {
         if !numbers.is_empty() {
             data.push((name, list(numbers).into()));
@@ -90,12 +100,64 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
         data.push(("normalisation", value.into()));
         data.push(("normalisation_error", error.into()));
     }
-    data.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    let of_ladder = status.last_round.as_deref().map(ladder).unwrap_or_default();
+    data.into_iter().map(|(name, value)| (name.to_owned(), value)).chain(of_ladder).collect()
+}
+
+/// `ladder.NAME` for the last round of replica exchange.
+///
+/// Texts: `betas`, `ln_z`, `rejection`, `predicted_rejection`, `rung_acceptance`, `image_share` (a space between
+/// numbers, as rungs and pairs are in order), `normaliser` (the one that was used).
+/// Numbers: those of [`RoundReport`] by their names, and c by each method with its standard error, such as
+/// `normaliser.mbar` and `normaliser.mbar_error`.
+fn ladder(report: &RoundReport) -> Vec<(String, Value)> {
+    let of_rungs = |value: fn(&RungReport) -> f64| list(&report.rungs.iter().map(value).collect::<Vec<_>>());
+    let mut data: Vec<(String, Value)> = [
+        ("round", f64::from(report.round).into()),
+        ("sweeps", (report.sweeps as f64).into()),
+        ("ladders", (report.ladders as f64).into()),
+        ("betas", list(&report.betas).into()),
+        ("ln_z", list(&report.ln_z).into()),
+        ("lit_share", report.lit_share.into()),
+        ("barrier", report.barrier.into()),
+        ("rejection", list(&report.rejection).into()),
+        ("predicted_rejection", list(&report.predicted_rejection).into()),
+        ("round_trips", (report.round_trips as f64).into()),
+        ("round_trips_predicted", report.round_trips_predicted.into()),
+        ("restarts", (report.restarts as f64).into()),
+        ("longest_rejection_run", (report.longest_rejection_run as f64).into()),
+        ("split_r_hat", report.split_r_hat.into()),
+        ("uniform_share", report.uniform_share.into()),
+        ("offers", (report.offers as f64).into()),
+        ("chain_ratio", report.chain_ratio.into()),
+        ("rung_acceptance", of_rungs(|rung| rung.acceptance).into()),
+        ("image_share", of_rungs(|rung| rung.image_share).into()),
+        ("normaliser", report.used.name().into()),
+    ]
+    .map(|(name, value): (&str, Value)| (format!("ladder.{name}"), value))
+    .into();
+    for normaliser in Normaliser::ALL {
+        let name = format!("ladder.normaliser.{}", normaliser.name().replace(' ', "_"));
+        let estimate = report.normalisers.of(normaliser);
+        data.push((format!("{name}_error"), estimate.standard_error().into()));
+        data.push((name, estimate.value().into()));
+    }
+    data.extend(report.image_share_before.map(|share| ("ladder.image_share_before".into(), share.into())));
+    data
+}
+
+/// Numbers with a space between them.
+fn list(numbers: &[f64]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::render::Settings;
+    use crate::tempering::{LnEstimate, NormaliserEstimates};
 
     #[test]
     fn the_extension_decides() {
@@ -121,6 +183,16 @@ mod tests {
             acceptance: vec![0.5],
             swap: vec![0.25],
             normalisation: Some((0.1, 0.01)),
+            last_round: Some(Arc::new(RoundReport {
+                betas: vec![0.0, 0.5, 1.0],
+                rejection: vec![0.25, f64::NAN],
+                round_trips: 9,
+                normalisers: NormaliserEstimates {
+                    mbar: LnEstimate { ln_value: 0.0, relative_error: 0.5 },
+                    ..NormaliserEstimates::default()
+                },
+                ..RoundReport::default()
+            })),
             ..Status::default()
         };
         let image = Image::constant(4, 3, [0.5; 3]);
@@ -134,6 +206,24 @@ mod tests {
         assert_eq!(value("betas"), Some("0 1".into()));
         assert_eq!(value("mutations"), Some(77.0.into()));
         assert_eq!(value("normalisation_error"), Some(0.01.into()));
+        assert_eq!(value("ladder.betas"), Some("0 0.5 1".into()), "those of the last round");
+        assert_eq!(value("ladder.rejection"), Some("0.25 NaN".into()));
+        assert_eq!(value("ladder.round_trips"), Some(9.0.into()));
+        assert_eq!(value("ladder.normaliser.mbar"), Some(1.0.into()));
+        assert_eq!(value("ladder.normaliser.mbar_error"), Some(0.5.into()));
+        assert_eq!(value("ladder.image_share_before"), None);
         assert!(output.files()[1].exists());
+    }
+
+    #[test]
+    fn what_was_chosen_about_metropolis_is_told_for_metropolis_alone() {
+        let names = ["large_steps", "normalisation_from", "kelemen_weights"];
+        let told = |method| {
+            let settings = Settings { method, ..Settings::default() };
+            let data = metadata(&RunStart { settings, ..RunStart::default() }, &Status::default());
+            names.map(|name| data.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone()))
+        };
+        assert_eq!(told(Method::Mlt), [Some(0.3.into()), Some("two-pass".into()), Some("false".into())]);
+        assert_eq!(told(Method::ReplicaExchange), [None, None, None]);
     }
 }

@@ -2,18 +2,42 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::settings::{LadderChoice, Method};
 use super::status::{Observer, RunStart, Status, Summary};
+use crate::tempering::RoundReport;
+
+/// How much is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Verbosity {
+    /// Nothing.
+    Quiet,
+    /// Progress, and how the run ended.
+    #[default]
+    Normal,
+    /// Also a table of the rounds, and what was chosen after each.
+    Verbose,
+}
 
 /// Shows a run on standard error.
 pub struct Progress {
     stop: Arc<AtomicBool>,
     display: Display,
+    /// For the table of rounds, where it is wanted.
+    table: Option<Mutex<Table>>,
+}
+
+/// What the table of rounds remembers.
+#[derive(Default)]
+struct Table {
+    /// Its header is written.
+    begun: bool,
+    /// Mutations per second so far.
+    pace: f64,
 }
 
 enum Display {
@@ -39,23 +63,26 @@ const BAR_STEPS: u64 = 1000;
 const PLAIN_GAP: Duration = Duration::from_secs(1);
 
 impl Progress {
-    /// Shows on standard error what suits it, or nothing if `quiet`. `stop` is raised once the run is to end early.
-    pub fn new(quiet: bool, stop: Arc<AtomicBool>) -> Progress {
-        if quiet {
-            return Progress { stop, display: Display::Quiet };
+    /// Shows on standard error what suits it. `stop` is raised once the run is to end early.
+    pub fn new(verbosity: Verbosity, stop: Arc<AtomicBool>) -> Progress {
+        if verbosity == Verbosity::Quiet {
+            return Progress { stop, display: Display::Quiet, table: None };
         }
         if !io::stderr().is_terminal() {
-            return Progress::plain(io::stderr(), stop);
+            return Progress::plain(io::stderr(), verbosity, stop);
         }
         let bar = ProgressBar::with_draw_target(Some(BAR_STEPS), ProgressDrawTarget::stderr());
         bar.set_style(ProgressStyle::with_template("{bar:24} {msg}").expect("a template known to be right"));
-        Progress { stop, display: Display::Terminal(bar) }
+        Progress { stop, display: Display::Terminal(bar), table: Table::of(verbosity) }
     }
 
     /// Plain lines to anything that can be written to.
-    pub fn plain(file: impl Write + Send + 'static, stop: Arc<AtomicBool>) -> Progress {
-        let plain = Plain { file: Box::new(file), tenths: 0, last: Duration::ZERO };
-        Progress { stop, display: Display::Plain(Mutex::new(plain)) }
+    pub fn plain(file: impl Write + Send + 'static, verbosity: Verbosity, stop: Arc<AtomicBool>) -> Progress {
+        let display = match verbosity {
+            Verbosity::Quiet => Display::Quiet,
+            _ => Display::Plain(Mutex::new(Plain { file: Box::new(file), tenths: 0, last: Duration::ZERO })),
+        };
+        Progress { stop, display, table: Table::of(verbosity) }
     }
 
     /// A line that stays.
@@ -69,8 +96,14 @@ impl Progress {
     }
 }
 
-fn locked(plain: &Mutex<Plain>) -> std::sync::MutexGuard<'_, Plain> {
-    plain.lock().unwrap_or_else(PoisonError::into_inner)
+impl Table {
+    fn of(verbosity: Verbosity) -> Option<Mutex<Table>> {
+        (verbosity == Verbosity::Verbose).then(Mutex::default)
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Observer for Progress {
@@ -82,6 +115,7 @@ impl Observer for Progress {
     }
 
     fn progress(&self, status: &Status) {
+        self.table.iter().for_each(|table| locked(table).pace = status.mutations_per_second());
         let stopping = if self.stop.load(Relaxed) { ", stopping (again to quit at once)" } else { "" };
         match &self.display {
             Display::Quiet => {}
@@ -101,6 +135,17 @@ impl Observer for Progress {
                 }
             }
         }
+    }
+
+    fn round(&self, report: &RoundReport) {
+        let Some(table) = &self.table else { return };
+        let mut table = locked(table);
+        if !table.begun {
+            self.say(&round_header());
+            table.begun = true;
+        }
+        self.say(&round_row(report, table.pace));
+        report.choices.iter().for_each(|choice| self.say(&format!("{:6}{choice}", "")));
     }
 
     fn finished(&self, summary: &Summary) {
@@ -161,6 +206,60 @@ fn rates(status: &Status) -> Option<String> {
     Some(acceptance.into_iter().chain(swaps).collect::<Vec<_>>().join(", "))
 }
 
+/// The columns of the table of rounds, right-aligned.
+const ROUND_COLUMNS: [(&str, usize); 9] = [
+    ("round", 5),
+    ("K", 4),
+    ("Λ", 6),
+    ("min", 6), // of swap acceptance over pairs
+    ("mean swap", 10),
+    ("round trips", 12),
+    ("normalisation", 18),
+    ("mut./s", 8),
+    ("uniform", 8),
+];
+
+/// The header of [`round_row`]s, 77 columns wide.
+pub fn round_header() -> String {
+    ROUND_COLUMNS.iter().map(|(name, width)| format!("{name:>width$}")).collect()
+}
+
+/// One round: replicas, communication barrier, acceptance of swaps over the pairs (least and mean), round trips, the
+/// estimate of c that is used with its standard error, mutations per second so far, share of uniform points.
+pub fn round_row(report: &RoundReport, mutations_per_second: f64) -> String {
+    let swaps = || report.rejection.iter().map(|rejection| 1.0 - rejection).filter(|swap| swap.is_finite());
+    let pairs = swaps().count();
+    let mean_swap = (pairs > 0).then(|| swaps().sum::<f64>() / pairs as f64);
+    let c = report.normalisers.of(report.used);
+    let decimals = |value: Option<f64>, n: usize| match value.filter(|value| value.is_finite()) {
+        Some(value) => format!("{value:.n$}"),
+        None => "–".into(),
+    };
+    let cells = [
+        report.round.to_string(),
+        report.replicas.to_string(),
+        decimals(Some(report.barrier), 2),
+        decimals(swaps().reduce(f64::min), 2),
+        decimals(mean_swap, 2),
+        report.round_trips.to_string(),
+        if c.ln_value.is_finite() {
+            format!("{} ± {} %", significant(c.value(), 4), decimals(Some(100.0 * c.relative_error), 2))
+        } else {
+            "–".into()
+        },
+        with_unit(mutations_per_second),
+        format!("{} %", decimals(Some(100.0 * report.uniform_share), 0)),
+    ];
+    cells.iter().zip(ROUND_COLUMNS).map(|(cell, (_, width))| format!("{cell:>width$}")).collect()
+}
+
+/// `4 replicas, 83 % uniform`
+fn choice(report: &RoundReport) -> String {
+    let uniform = format!("{:.0} % uniform", 100.0 * report.uniform_share);
+    let uniform = Some(uniform).filter(|_| report.uniform_share.is_finite());
+    [Some(format!("{} replicas", report.replicas)), uniform].into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
 /// What is said at the end: files, effort, warnings.
 pub fn ending(summary: &Summary) -> String {
     let status = &summary.status;
@@ -174,17 +273,32 @@ pub fn ending(summary: &Summary) -> String {
     lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
     let files: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     lines.push(format!(
-        "{} mutations in {} ({}/s); wrote {}",
+        "{} mutations in {} ({}/s{}); wrote {}",
         with_unit(status.mutations as f64),
         rough(status.elapsed),
         with_unit(status.mutations_per_second()),
+        status.last_round.as_deref().map(|round| format!(", {}", choice(round))).unwrap_or_default(),
         if files.is_empty() { "nothing".into() } else { files.join(" and ") },
     ));
     lines.join("\n")
 }
 
+/// So many significant digits: `0.01235`, `12.35`; very small and large numbers as `1.235e-7`.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".into() } else { "–".into() };
+    }
+    // the power of ten after rounding to that many digits
+    let scientific = format!("{value:.*e}", digits - 1);
+    let power: i32 = scientific.split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0);
+    match power {
+        -3..=4 => format!("{value:.*}", (digits as i32 - 1 - power).max(0) as usize),
+        _ => scientific,
+    }
+}
+
 /// Three digits and a power of thousand: `950`, `1.23 k`, `45.6 M`.
-fn with_unit(value: f64) -> String {
+pub fn with_unit(value: f64) -> String {
     // From this on a number would be rounded to one of four digits and belongs to the next unit.
     const NEXT: f64 = 999.5;
     let (mut value, mut unit) = (value, "");
@@ -227,6 +341,7 @@ fn span(rates: &[f64]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::render::settings::Settings;
+    use crate::tempering::{LnEstimate, Normaliser, NormaliserEstimates};
 
     #[test]
     fn numbers_have_three_digits() {
@@ -272,7 +387,7 @@ mod tests {
     #[test]
     fn plain_lines_come_at_tenths_and_hold_no_escape_codes() {
         let path = tempfile::NamedTempFile::new().unwrap();
-        let progress = Progress::plain(path.reopen().unwrap(), Arc::default());
+        let progress = Progress::plain(path.reopen().unwrap(), Verbosity::Normal, Arc::default());
         progress.started(&RunStart {
             scene: "door.xml".into(),
             width: 4,
@@ -298,6 +413,77 @@ mod tests {
         );
         assert_eq!(text.lines().count(), 1 + 9 + 1, "{text}");
         assert!(text.lines().last().unwrap().ends_with("wrote a.exr and a.png"), "{text}");
+    }
+
+    fn report() -> RoundReport {
+        RoundReport {
+            round: 5,
+            replicas: 4,
+            barrier: 1.815,
+            rejection: vec![0.25, f64::NAN, 0.5],
+            round_trips: 1234,
+            normalisers: NormaliserEstimates {
+                mbar: LnEstimate { ln_value: 0.25f64.ln(), relative_error: 0.0031 },
+                ..NormaliserEstimates::default()
+            },
+            used: Normaliser::Mbar,
+            uniform_share: 0.834,
+            choices: vec!["K stays at 4: Λ is 1.8".into()],
+            ..RoundReport::default()
+        }
+    }
+
+    #[test]
+    fn a_round_is_a_row_under_its_header() {
+        assert_eq!(
+            [round_header(), round_row(&report(), 1.86e6)].join("\n"),
+            "\
+round   K     Λ   min mean swap round trips     normalisation  mut./s uniform
+    5   4  1.81  0.50      0.62        1234   0.2500 ± 0.31 %  1.86 M    83 %"
+        );
+        let unknown = RoundReport { barrier: f64::NAN, uniform_share: 1.0, ..RoundReport::default() };
+        assert_eq!(
+            round_row(&unknown, 0.0),
+            "    0   0     –     –         –           0                 –       0   100 %"
+        );
+    }
+
+    #[test]
+    fn rounds_are_told_when_asked_for_with_one_header() {
+        for (verbosity, lines) in [(Verbosity::Quiet, 0), (Verbosity::Normal, 0), (Verbosity::Verbose, 1 + 2 + 2)] {
+            let path = tempfile::NamedTempFile::new().unwrap();
+            let progress = Progress::plain(path.reopen().unwrap(), verbosity, Arc::default());
+            progress.round(&report());
+            progress.round(&report());
+            let text = std::fs::read_to_string(path.path()).unwrap();
+            assert_eq!(text.lines().count(), lines, "{verbosity:?}: {text}");
+            assert_eq!(text.matches("round trips").count(), lines.min(1), "{text}");
+            assert_eq!(text.matches("\n      K stays at 4: Λ is 1.8\n").count(), lines / 2, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_end_names_the_ladder_that_was_chosen() {
+        let status = Status { last_round: Some(Arc::new(report())), ..Status::default() };
+        let text = ending(&Summary { status, ..Summary::default() });
+        assert!(text.contains("(0/s, 4 replicas, 83 % uniform); wrote"), "{text}");
+    }
+
+    #[test]
+    fn digits_are_significant() {
+        let expected = [
+            (0.0, "0"),
+            (0.0123456, "0.01235"),
+            (0.99996, "1.000"),
+            (-12.3456, "-12.35"),
+            (12345.6, "12346"),
+            (1.23456e-7, "1.235e-7"),
+            (1e9, "1.000e9"),
+            (f64::NAN, "–"),
+        ];
+        for (value, text) in expected {
+            assert_eq!(significant(value, 4), text, "{value}");
+        }
     }
 
     #[test]

@@ -1,12 +1,15 @@
 //! The render loop: slices of sweeps until the budget is spent.
 
 use std::{
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
 use super::{
-    baseline::TwoPassMlt,
+    baseline::Mlt,
     calibration,
     engine::{Engine, Stage},
     output::{Picture, metadata},
@@ -20,6 +23,7 @@ use crate::{
     path::unidirectional::{Mapping, Widths},
     rng::Rng,
     scene::Scene,
+    tempering::RoundReport,
 };
 
 /// A scene and what to do with it.
@@ -80,13 +84,13 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     };
     let start = run_start(job, threads, widths);
     observer.started(&start);
-    let (mut engine, interrupted) = pool.install(|| {
+    let (mut engine, end) = pool.install(|| {
         let mutations = job.settings.mutations_per_pixel.map(|mpp| (mpp * stage.pixels() as f64).ceil() as u64);
         let mut engine = engine(&stage, &job.settings, mutations);
-        let interrupted = work(job, &stage, engine.as_mut(), &start, observer, begin);
-        (engine, interrupted)
+        let end = work(job, &stage, engine.as_mut(), &start, observer, begin);
+        (engine, end)
     });
-    Ok(conclude(job, &stage, engine.as_mut(), &start, interrupted, begin))
+    Ok(conclude(job, &stage, engine.as_mut(), &start, end, begin))
 }
 
 fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
@@ -103,12 +107,20 @@ fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderErr
 pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
     match settings.method {
         Method::Path => Box::new(PathTracer::new(stage, mutations)),
-        Method::Mlt => Box::new(TwoPassMlt::new(stage, mutations)),
+        Method::Mlt => Box::new(Mlt::new(stage, &settings.mlt, mutations)),
         Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
     }
 }
 
-/// Slice after slice until a budget is spent or the run is stopped; true if stopped.
+/// How the work came to an end.
+struct End {
+    /// It was stopped before its budget was spent.
+    interrupted: bool,
+    /// The last round that was over by then.
+    last_round: Option<Arc<RoundReport>>,
+}
+
+/// Slice after slice until a budget is spent or the run is stopped.
 fn work(
     job: &Job,
     stage: &Stage,
@@ -116,17 +128,18 @@ fn work(
     start: &RunStart,
     observer: &dyn Observer,
     begin: Instant,
-) -> bool {
+) -> End {
+    let mut last_round = None;
     let mut done = 0;
     let mut slice = 1;
     loop {
         let left = engine.sweeps_wanted().map_or(u64::MAX, |wanted| wanted - done);
         let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(begin.elapsed()));
         if left == 0 || time_left.is_zero() {
-            return false;
+            return End { interrupted: false, last_round };
         }
         if job.stop.load(Ordering::Relaxed) {
-            return true;
+            return End { interrupted: true, last_round };
         }
         let slice_begin = Instant::now();
         let sweeps = slice.min(left);
@@ -137,8 +150,11 @@ fn work(
         let next = SLICE.min(job.settings.time.map_or(SLICE, |time| time.saturating_sub(begin.elapsed())));
         slice = ((next.as_secs_f64() / a_sweep) as u64).clamp(1, 2 * slice);
 
-        let status = status(job, engine, begin);
+        let rounds: Vec<_> = engine.take_reports().into_iter().map(Arc::new).collect();
+        last_round = rounds.last().cloned().or(last_round);
+        let status = status(job, engine, last_round.clone(), begin);
         observer.progress(&status);
+        rounds.iter().for_each(|round| observer.round(round));
         if observer.wants_picture(&status) {
             let development = engine.develop(stage);
             let status =
@@ -150,7 +166,7 @@ fn work(
     }
 }
 
-fn status(job: &Job, engine: &dyn Engine, begin: Instant) -> Status {
+fn status(job: &Job, engine: &dyn Engine, last_round: Option<Arc<RoundReport>>, begin: Instant) -> Status {
     let counts = engine.counts();
     Status {
         elapsed: begin.elapsed(),
@@ -162,18 +178,12 @@ fn status(job: &Job, engine: &dyn Engine, begin: Instant) -> Status {
         swap: counts.swap,
         non_finite: counts.non_finite,
         normalisation: None,
+        last_round,
     }
 }
 
-fn conclude(
-    job: &Job,
-    stage: &Stage,
-    engine: &mut dyn Engine,
-    start: &RunStart,
-    interrupted: bool,
-    begin: Instant,
-) -> Outcome {
-    let status = status(job, engine, begin);
+fn conclude(job: &Job, stage: &Stage, engine: &mut dyn Engine, start: &RunStart, end: End, begin: Instant) -> Outcome {
+    let status = status(job, engine, end.last_round, begin);
     let development = engine.develop(stage);
     let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
     let mut warnings = development.warnings;
@@ -189,7 +199,7 @@ fn conclude(
         ));
     }
     let picture = Picture { image: development.image, layers: development.layers, metadata: metadata(start, &status) };
-    Outcome { picture, status, interrupted, warnings }
+    Outcome { picture, status, interrupted: end.interrupted, warnings }
 }
 
 fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Serialize, Serializer};
 
+use crate::chain::LARGE_STEP_PROBABILITY;
 use crate::embree::Width;
 
 /// How the image is estimated.
@@ -79,6 +80,56 @@ impl Combine {
     }
 }
 
+/// Where `mlt` has its normalisation c from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Normalisation {
+    /// The mean of g over the first pass alone. The image is unbiased, as chains start from states resampled among the
+    /// same samples (Veach & Guibas 1997), and keeps the error of c however long the chains run.
+    #[default]
+    TwoPass,
+    /// The mean of g over the first pass and all proposals of large steps, which are independent uniform samples as
+    /// well. The error of c falls like the chains'; the image is biased by O(1/N), since c and the chains' mean come of
+    /// the same steps, and consistent.
+    Pooled,
+}
+
+impl Normalisation {
+    /// Both.
+    pub const ALL: [Normalisation; 2] = [Normalisation::TwoPass, Normalisation::Pooled];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Normalisation::TwoPass => "two-pass",
+            Normalisation::Pooled => "pooled",
+        }
+    }
+}
+
+/// What may be chosen about `mlt`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MltSettings {
+    /// Probability of a large step, in (0, 1).
+    pub large_steps: f64,
+    /// Where c comes from.
+    pub normalisation: Normalisation,
+    /// Whether proposals of large steps enter the image as uniform samples; see
+    /// [`LargeSteps`](crate::chain::LargeSteps::kelemen_weights).
+    pub kelemen_weights: bool,
+}
+
+impl Default for MltSettings {
+    /// The paper's baseline.
+    fn default() -> MltSettings {
+        MltSettings {
+            large_steps: LARGE_STEP_PROBABILITY,
+            normalisation: Normalisation::default(),
+            kelemen_weights: false,
+        }
+    }
+}
+
 /// How many rays go to Embree at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PacketChoice {
@@ -118,6 +169,8 @@ pub struct Settings {
     pub ladder: LadderChoice,
     /// Combination of the rungs, for replica exchange.
     pub combine: Combine,
+    /// Large steps and their use, for `mlt`.
+    pub mlt: MltSettings,
     /// Rays at a time.
     pub packet: PacketChoice,
 }
@@ -136,6 +189,7 @@ impl Default for Settings {
             time: None,
             ladder: LadderChoice::default(),
             combine: Combine::default(),
+            mlt: MltSettings::default(),
             packet: PacketChoice::default(),
         }
     }
@@ -159,6 +213,9 @@ impl Settings {
                 LadderChoice::Replicas(k) => faults.extend(replicas_fault(*k)),
                 LadderChoice::Betas(betas) => betas_faults(betas, &mut faults),
             }
+        }
+        if self.method == Method::Mlt {
+            faults.extend(large_steps_fault(self.mlt.large_steps));
         }
         self.budget_faults(&mut faults);
         if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
@@ -226,6 +283,16 @@ fn betas_faults(betas: &[f64], faults: &mut Vec<String>) {
     }
 }
 
+fn large_steps_fault(p: f64) -> Option<String> {
+    let accepted = p > 0.0 && p < 1.0;
+    (!accepted).then(|| {
+        format!(
+            "--large-steps {p}: the probability must be above 0, or chains stay where they began, and below 1, or they \
+             never explore; for uniform sampling alone use --method path"
+        )
+    })
+}
+
 fn seconds<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
     time.map(|time| time.as_secs_f64()).serialize(serializer)
 }
@@ -280,6 +347,24 @@ mod tests {
             s.ladder = LadderChoice::Replicas(0);
         });
         assert_eq!(message, "");
+    }
+
+    #[test]
+    fn some_steps_are_large_and_some_are_small() {
+        let of = |method, p| {
+            faults(|s| {
+                s.method = method;
+                s.mlt.large_steps = p;
+            })
+        };
+        for p in [f64::MIN_POSITIVE, 0.5, 1.0 - f64::EPSILON] {
+            assert_eq!(of(Method::Mlt, p), "");
+        }
+        for p in [0.0, 1.0, -0.1, 2.0, f64::NAN, f64::INFINITY] {
+            let message = of(Method::Mlt, p);
+            assert!(message.contains(&format!("--large-steps {p}: ")) && message.contains("above 0"), "{message}");
+            assert_eq!(of(Method::ReplicaExchange, p), "", "of no account to other methods");
+        }
     }
 
     #[test]

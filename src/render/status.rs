@@ -1,12 +1,14 @@
 //! Where a run stands, and who wants to know.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
 
 use super::output::Picture;
 use super::settings::Settings;
+use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -65,6 +67,8 @@ pub struct Status {
     pub non_finite: u64,
     /// The estimate of c = ∫ g and its standard error, once there is one.
     pub normalisation: Option<(f64, f64)>,
+    /// The last round that ended; absent before that, and for methods without rounds.
+    pub last_round: Option<Arc<RoundReport>>,
 }
 
 impl Status {
@@ -118,6 +122,9 @@ pub trait Observer: Sync {
 
     /// Some blocks later; as often as it comes handy to the render loop.
     fn progress(&self, _status: &Status) {}
+
+    /// A round is over; follows the [`progress`](Observer::progress) of the moment in which that was noticed.
+    fn round(&self, _report: &RoundReport) {}
 
     /// Whether [`snapshot`](Observer::snapshot) should follow, for which a picture has to be made.
     fn wants_picture(&self, _status: &Status) -> bool {

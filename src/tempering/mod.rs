@@ -11,9 +11,11 @@ mod combination;
 mod histogram;
 mod ladder;
 mod normalisers;
+mod report;
 
 pub use block::{Block, LAYERS, RungCounts, Statistics, layer};
 pub use combination::{Combination, Weights};
 pub use histogram::Histogram;
 pub use ladder::{Ladder, swap_acceptance};
 pub use normalisers::{Estimate, Group, Normalisers, uniform_mean};
+pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungReport, ScaleReport};

@@ -2,7 +2,10 @@
 
 use relt::embree::Width;
 use relt::film::{Image, Plane};
-use relt::render::{Combine, LadderChoice, Method, Observer, Outcome, PacketChoice, Picture, Settings, Status};
+use relt::render::{
+    Combine, LadderChoice, Method, MltSettings, Normalisation, Observer, Outcome, PacketChoice, Picture, Settings,
+    Status,
+};
 use relt::scene::Scene;
 
 use crate::support::{OWN, own, render, settings};
@@ -10,11 +13,20 @@ use crate::support::{OWN, own, render, settings};
 /// Mutations a pixel of 24 × 24 pixels: enough for a bootstrap and three rounds after it.
 const MUTATIONS: f64 = 60.0;
 
-/// All methods, ladders of two and of five rungs, both combinations.
+/// All methods, ladders of two and of five rungs, both combinations; Metropolis as it is and with all its options.
 fn methods() -> Vec<Settings> {
     let of = |method| settings(method, MUTATIONS, 11);
     let re = |k, combine| Settings { ladder: LadderChoice::Replicas(k), combine, ..of(Method::ReplicaExchange) };
-    vec![of(Method::Path), of(Method::Mlt), re(2, Combine::Balance), re(5, Combine::Balance), re(5, Combine::Target)]
+    let mlt = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
+    let mlt = Settings { mlt, ..of(Method::Mlt) };
+    vec![
+        of(Method::Path),
+        of(Method::Mlt),
+        mlt,
+        re(2, Combine::Balance),
+        re(5, Combine::Balance),
+        re(5, Combine::Target),
+    ]
 }
 
 fn scenes() -> Vec<(&'static str, Scene)> {

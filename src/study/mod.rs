@@ -1,0 +1,6 @@
+//! What runs leave behind, read and drawn.
+
+pub mod ladder_page;
+pub mod ladder_text;
+pub mod run_log;
+mod svg;
