@@ -34,10 +34,20 @@ impl Plan {
         };
         // fewer lanes first in number a block, then in blocks, so that every lane gets its steps
         let all_groups = (mutations / (SHORTEST_CHAIN * lanes_per_group as u64)) as usize;
-        let blocks = (all_groups / groups_at_most).clamp(FEWEST_BLOCKS, BLOCKS);
+        // an even number, of which halves are compared
+        let blocks = (all_groups / groups_at_most).clamp(FEWEST_BLOCKS, BLOCKS) & !1;
         let groups = (all_groups / blocks).clamp(1, groups_at_most);
         let a_sweep = (blocks * groups * lanes_per_group) as u64;
         Plan { blocks, groups, lanes_per_group, sweeps: Some(mutations.div_ceil(a_sweep).max(1)) }
+    }
+
+    /// Groups of `lanes_per_group` for each of the blocks, where `mutations` are left.
+    pub fn groups_a_block(&self, mutations: Option<u64>, lanes_per_group: usize) -> usize {
+        let at_most = (LANES / lanes_per_group).max(1);
+        mutations.map_or(at_most, |mutations| {
+            let all = mutations / (SHORTEST_CHAIN * lanes_per_group as u64);
+            (all as usize / self.blocks).clamp(1, at_most)
+        })
     }
 
     /// Lanes of one block.

@@ -40,6 +40,11 @@ const OFFERS_TAKEN: f64 = 0.5;
 /// What an evaluation costs beside its rays, in rays: random numbers, shading, recording (benches/mutations.rs: half of
 /// the time of paths with some eight rays is spent outside Embree).
 const COST_BESIDE_RAYS: f64 = 6.0;
+/// What a state counts for in the first round, before that is measured.
+const FIRST_RATIO: f64 = 0.25;
+/// Share of uniform points, at least, and at most where chains are asked for.
+const LEAST_UNIFORM: f64 = 0.1;
+const MOST_UNIFORM_WITH_CHAINS: f64 = 15.0 / 16.0;
 
 /// Replica exchange at work on one target.
 pub struct Sampler<W> {
@@ -52,7 +57,14 @@ pub struct Sampler<W> {
     schedule: Schedule,
     /// Magnitude of c, fixed when chains start.
     ln_unit: f64,
+    /// Points offered to a ladder each sweep.
     offers: usize,
+    ladders_a_block: usize,
+    /// Weights and shares of the round.
+    choice: Choice,
+    /// Rungs were moved for the next round.
+    moved: bool,
+    round_rays: Rays,
     /// The part of the film's weight that each pixel has got, in evaluations.
     effort: f64,
     /// States of chains on each rung so far, pilot rounds included.
@@ -62,6 +74,16 @@ pub struct Sampler<W> {
     non_finite: u64,
     rays: u64,
     latest: Option<Learnt>,
+    reports: Vec<RoundReport>,
+}
+
+/// Rays of a round.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rays {
+    /// Of points that were not offered, and how many these were.
+    uniform: [f64; 2],
+    /// Of ladders, offered points included.
+    ladders: f64,
 }
 
 /// The film and all that belongs to it.
@@ -95,21 +117,14 @@ struct Schedule {
     done: u64,
     /// Independent points of a block in each sweep, beside its ladders.
     points: usize,
+    /// Evaluations that the round was planned for.
+    evaluations: u64,
     /// Nothing is learnt any more.
     frozen: bool,
     /// Evaluations before settings were frozen.
     learning: u64,
 }
 
-/// What is known at the end of a round.
-pub struct Learnt {
-    /// ln Z of every rung, and c.
-    pub normalisers: Normalisers,
-    /// c from uniform points alone.
-    pub uniform: Estimate,
-    /// How g is spread over the cube.
-    pub density: Option<DensityOfStates>,
-}
 
 /// What a run of replica exchange is about, beside what is sampled.
 pub struct Setup {
@@ -175,6 +190,11 @@ impl<W: Default + Send> Sampler<W> {
             choices,
             ln_unit: 0.0,
             offers: 0,
+            ladders_a_block: 0,
+            choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            moved: false,
+            round_rays: Rays::default(),
+            reports: Vec::new(),
             effort: 0.0,
             states_a_rung: 0,
             evaluations: 0,
@@ -237,6 +257,15 @@ impl<W: Default + Send> Sampler<W> {
                 block.deposit(&canvas, number);
             }
         });
+        for portion in &mut self.portions {
+            let [uniform, faults] = portion.uniform.take_rays_and_faults();
+            let [ladders, more] = portion.ladders.as_mut().map_or([0; 2], Block::take_rays_and_faults);
+            self.rays += uniform + ladders;
+            self.non_finite += faults + more;
+            self.round_rays.uniform[0] += uniform as f64;
+            self.round_rays.ladders += ladders as f64;
+        }
+        self.round_rays.uniform[1] += (sweeps as usize * self.portions.len() * self.schedule.points) as f64;
         let evaluations = sweeps * self.a_sweep();
         self.evaluations += evaluations;
         self.effort += evaluations as f64;
@@ -248,4 +277,44 @@ impl<W: Default + Send> Sampler<W> {
     fn ladders(&self) -> u64 {
         self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.ladders_a_block() as u64
     }
+}
+
+impl Screen {
+    fn canvas(&self) -> Canvas<'_> {
+        Canvas {
+            footprint: &self.footprint,
+            size: self.size,
+            film: &self.film,
+            layers: self.layers,
+            probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
+        }
+    }
+}
+
+/// The layers that those choices need, with room for the parts of `most_rungs`.
+fn layers(choices: &Choices, most_rungs: usize) -> Layers {
+    let mut count = 0;
+    let mut layer = |wanted: bool, layers: usize| {
+        wanted.then(|| {
+            count += layers;
+            count - layers
+        })
+    };
+    let pair = !matches!(choices.combine, Combine::Balance | Combine::Target | Combine::Uniform);
+    let balance = choices.combine == Combine::Balance || choices.layers;
+    let chains = most_rungs > 1;
+    let layers = Layers {
+        uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
+        hot: layer(balance, 1),
+        tempered: layer(balance && chains, 1),
+        target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
+        rungs: layer(choices.layers && chains, most_rungs.saturating_sub(1)),
+        count: 0,
+    };
+    Layers { count, ..layers }
+}
+
+/// `length`, or that part of the run where it is less.
+fn at_most(length: u64, wanted: Option<u64>, part: f64) -> u64 {
+    wanted.map_or(length, |wanted| length.min((wanted as f64 * part) as u64)).max(1)
 }

@@ -1,0 +1,282 @@
+//! Ends of rounds.
+
+/// Ends of rounds: what was learnt, and what follows from it.
+impl<W: Default + Send> Sampler<W> {
+    /// Ends the round at work and begins the next.
+    fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
+        self.flush();
+        let learnt = self.learn();
+        let mut report = self.report(&learnt);
+        let choices = match (self.schedule.round, learnt.normalisers.target.ln_value.is_finite()) {
+            // nothing lit yet: nothing to start chains from, nothing else to do but to go on
+            (0, false) => {
+                self.schedule.length *= 2;
+                return;
+            }
+            (0, true) => self.raise_ladders(target, &learnt),
+            _ if self.schedule.frozen => Vec::new(),
+            _ => self.adapt(&learnt),
+        };
+        report.choices = choices;
+        report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.effort);
+        self.reports.push(report);
+        self.begin_round(&learnt);
+        self.latest = Some(learnt);
+    }
+
+    /// Records what states have gathered; the round's settings still hold.
+    fn flush(&mut self) {
+        let (screen, round) = (&self.screen, &self.round);
+        self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
+            if let Some(block) = &mut portion.ladders {
+                block.flush(&screen.canvas(), round);
+                block.deposit(&screen.canvas(), number);
+            }
+        });
+    }
+
+    /// What all that is recorded says.
+    fn learn(&self) -> Learnt {
+        let groups: Vec<Vec<Histogram>> = self.portions.iter().map(|portion| self.group(portion)).collect();
+        Learnt::of(&self.round.ladder, &groups)
+    }
+
+    /// A portion's histograms by rung.
+    fn group(&self, portion: &Portion<W>) -> Vec<Histogram> {
+        let mut group = vec![Histogram::default(); self.round.ladder.rungs()];
+        group[0].merge(&portion.tally.histograms[0]);
+        group.iter_mut().zip(&portion.past).for_each(|(sum, past)| sum.merge(past));
+        if let Some(block) = &portion.ladders {
+            block.add_histograms(&mut group);
+        }
+        group
+    }
+
+    /// The first ladders: their rungs follow from how g is spread, their states from the points seen so far.
+    fn raise_ladders<T: Target<Workspace = W>>(&mut self, target: &T, learnt: &Learnt) -> Vec<String> {
+        let density = &learnt.density;
+        let barrier = density.barrier();
+        self.round.ladder = match &self.choices.ladder {
+            LadderChoice::Auto => density.place(rungs(barrier).min(MOST_AUTOMATIC)),
+            LadderChoice::Replicas(k) => density.place(*k as usize),
+            LadderChoice::Betas(betas) => Ladder::new(betas.clone()),
+        };
+        let ladder = &self.round.ladder;
+        let chains = ladder.chains();
+        self.ln_unit = learnt.normalisers.target.ln_value;
+        self.offers = chains;
+        let remaining = self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations));
+        let ladders = self.plan.groups_a_block(remaining, 2 * chains);
+        let samples: Vec<Start> = self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
+        let all = ladders * self.portions.len();
+        let starts: Vec<Vec<Start>> = ladder.betas()[1..]
+            .par_iter()
+            .enumerate()
+            .map(|(rung, &beta)| resample(&samples, beta, all, self.rng, rung as u32))
+            .collect();
+        let (rng, layers, offers) = (self.rng, self.screen.layers.count, self.offers);
+        self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
+            let first = i * ladders;
+            let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
+            let mut block = Block::new(rng, (first as u32, ladders), chains + 1, offers, LANES_A_PART, layers);
+            block.start(target, &starts);
+            portion.ladders = Some(block);
+        });
+        self.ladders_a_block = ladders;
+        self.round.mixes = vec![StepMix::kelemen(); chains + 1];
+        self.choice = Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
+        let how = match self.choices.ladder {
+            LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
+            LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
+            LadderChoice::Betas(_) => "inverse temperatures as given".into(),
+        };
+        vec![how]
+    }
+
+    /// Settles rungs, steps, weights and shares for the next round.
+    fn adapt(&mut self, learnt: &Learnt) -> Vec<String> {
+        let mut said = Vec::new();
+        let last = self.is_last_lesson();
+        let choice = self.tune(learnt, last);
+        let counts = self.counts_by_rung();
+        for (mix, counts) in self.round.mixes.iter_mut().zip(&counts).skip(1) {
+            *mix = mix.tuned(&counts.steps);
+        }
+        if !last && !matches!(self.choices.ladder, LadderChoice::Betas(_)) {
+            said.extend(self.place_anew(learnt));
+        }
+        if let Some(choice) = choice {
+            self.choice = choice;
+            said.push(match choice.ratio {
+                0.0 => "path tracing: no share of chains makes the error less".into(),
+                ratio => format!(
+                    "{:.0} % uniform points, a state counts for {ratio} of one: {:.2} times the error of path tracing",
+                    100.0 * choice.share, choice.relative_error
+                ),
+            });
+        }
+        if self.choice.ratio == 0.0 {
+            self.give_up_ladders();
+        } else {
+            let accepted = counts[1].swaps.acceptance();
+            let most = self.uniform_a_ladder(self.round.ladder.chains()).floor().max(1.0);
+            self.offers = (OFFERS_TAKEN / accepted.max(1e-9)).ceil().min(most) as usize;
+            let (rng, offers) = (self.rng, self.offers);
+            self.portions.iter_mut().flat_map(|p| &mut p.ladders).for_each(|block| block.set_offers(rng, offers));
+        }
+        if last {
+            self.schedule.frozen = true;
+            self.schedule.learning = self.evaluations;
+            self.screen.probes = None;
+        }
+        said
+    }
+
+    /// Uniform points a sweep for each ladder of `chains` chains, by the share that is chosen.
+    fn uniform_a_ladder(&self, chains: usize) -> f64 {
+        chains as f64 * self.choice.share / (1.0 - self.choice.share)
+    }
+
+    /// Whether what is learnt now is the last.
+    fn is_last_lesson(&self) -> bool {
+        let next = self.evaluations as f64 + 2.0 * (self.schedule.length * self.a_sweep()) as f64;
+        self.schedule.round >= LEARNING_ROUNDS || self.wanted.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
+    }
+
+    /// The weights and the share that serve best, where they are free.
+    fn tune(&self, learnt: &Learnt, last: bool) -> Option<Choice> {
+        let probes = self.screen.probes.as_ref()?;
+        let free = self.choices.ladder == LadderChoice::Auto;
+        // while chains are to show what they can do they keep a part of the work, less in each round
+        let most = match (free, last) {
+            (true, true) => 1.0,
+            (false, true) => MOST_UNIFORM_WITH_CHAINS,
+            _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
+        };
+        let shares = self.choices.uniform_share.map_or(LEAST_UNIFORM..=most, |share| share..=share);
+        let states = (self.schedule.done * self.ladders()) as f64;
+        let points = (self.schedule.done as usize * self.portions.len() * self.points_a_block()) as f64;
+        let chains = self.round.ladder.chains() as f64;
+        let pixels = f64::from(self.screen.size[0]) * f64::from(self.screen.size[1]);
+        let target = learnt.normalisers.target;
+        let scale = pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states);
+        let measured = Measured {
+            probes: (0..RATIOS.len()).map(|ratio| probes.sums(ratio)).collect(),
+            pixels,
+            points,
+            states: chains * states,
+            tempered_scale: [scale; 2],
+            normaliser_variance: target.relative_error.powi(2),
+            mean: target.value,
+            cost: self.costs(chains * states),
+            shares: &shares,
+        };
+        Some(measured.choose())
+    }
+
+    /// Cost of a uniform point and of a step of a chain, in rays.
+    fn costs(&self, states: f64) -> [f64; 2] {
+        let Rays { uniform: [rays, points], ladders } = self.round_rays;
+        let a_point = rays / points.max(1.0);
+        let offered = (self.schedule.done * self.ladders()) as f64 * self.offers as f64;
+        let a_state = (ladders - offered * a_point).max(0.0) / states.max(1.0);
+        [a_point + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
+    }
+
+    /// Places rungs at equal rejection, unless they are near enough.
+    fn place_anew(&mut self, learnt: &Learnt) -> Option<String> {
+        let ladder = &self.round.ladder;
+        let rejections = |ladder: &Ladder| -> Vec<f64> {
+            ladder.betas().windows(2).map(|pair| learnt.density.rejection(pair[0], pair[1])).collect()
+        };
+        let now = rejections(ladder);
+        let [least, most] = [f64::min, f64::max].map(|f| now.iter().copied().reduce(f).unwrap_or(0.0));
+        if most - least <= UNEQUAL_REJECTION {
+            return None;
+        }
+        let placed = learnt.density.place(ladder.rungs());
+        if placed == *ladder {
+            return None;
+        }
+        self.round.ladder = placed;
+        self.moved = true;
+        Some(format!("rungs placed anew: neighbours rejected {least:.2} to {most:.2} of their swaps"))
+    }
+
+    /// Chains stop; what they found stays in the image and in the normalisers.
+    fn give_up_ladders(&mut self) {
+        for portion in &mut self.portions {
+            if let Some(block) = portion.ladders.take() {
+                let mut past = vec![Histogram::default(); self.round.ladder.rungs()];
+                block.add_histograms(&mut past);
+                portion.past = past;
+            }
+        }
+    }
+
+    /// Fixes what holds in the next round.
+    fn begin_round(&mut self, learnt: &Learnt) {
+        let ladders = self.ladders() as usize;
+        let density = &learnt.density;
+        if ladders > 0 {
+            let ln_zeta: Vec<f64> =
+                self.round.ladder.betas().iter().map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) }).collect();
+            let uniform = self.uniform_a_ladder(self.round.ladder.chains()) * self.ladders_a_block as f64;
+            self.schedule.points = (uniform.round() as usize).saturating_sub(self.offers * self.ladders_a_block);
+            self.round.weights = Weights::new(&self.round.ladder, &ln_zeta, self.choice.ratio, self.ln_unit);
+        } else {
+            self.schedule.points = self.plan.lanes();
+            self.round.weights = Weights::uniform_alone();
+        }
+        let a_sweep = self.a_sweep() as f64;
+        let points = (self.portions.len() * self.points_a_block()) as f64;
+        self.round.effort = [a_sweep / points, if ladders > 0 { a_sweep / ladders as f64 } else { 0.0 }];
+        for portion in &mut self.portions {
+            portion.tally.reset_counts();
+            if let Some(block) = &mut portion.ladders {
+                block.reset_counts();
+                if self.moved {
+                    block.forget_tempered();
+                }
+            }
+        }
+        self.moved = false;
+        if self.screen.probes.is_some() {
+            self.screen.probes = Some(Probes::new(&self.screen.map, self.screen.unit));
+        }
+        self.round_rays = Rays::default();
+        self.schedule.round += 1;
+        let evaluations = match (self.schedule.round, self.schedule.frozen) {
+            (1, _) => {
+                let pixels = u64::from(self.screen.size[0]) * u64::from(self.screen.size[1]);
+                at_most(FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels), self.wanted, LEARNING_PART / 4.0)
+            }
+            (_, false) => 2 * self.schedule.evaluations,
+            // as long as all that came before
+            (_, true) => self.evaluations,
+        };
+        self.schedule.evaluations = evaluations;
+        self.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
+        self.schedule.done = 0;
+        let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
+        self.round.half = sweeps + self.schedule.length / 2;
+    }
+
+    /// Uniform points of a block in a sweep, offered or not.
+    fn points_a_block(&self) -> usize {
+        let offered = if self.ladders() > 0 { self.offers * self.ladders_a_block } else { 0 };
+        offered + self.schedule.points
+    }
+
+    /// Counts of the round, by rung.
+    fn counts_by_rung(&self) -> Vec<RungCounts> {
+        let mut sums = vec![RungCounts::default(); self.round.ladder.rungs()];
+        for portion in &self.portions {
+            sums[0].add(&portion.tally.counts[0]);
+            if let Some(block) = &portion.ladders {
+                block.add_counts(&mut sums);
+            }
+        }
+        sums
+    }
+}
