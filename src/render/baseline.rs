@@ -13,7 +13,7 @@ use crate::{
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
     sample::{Move, Points, StepLaw},
-    tempering::{Estimate, uniform_mean},
+    tempering::Estimate,
 };
 
 /// Independent samples of the first pass; half of the budget where that is less.
@@ -47,7 +47,7 @@ impl TwoPassMlt {
         let batches = first_pass(stage, bootstrap);
         let groups: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
-        let normalisation = uniform_mean(&groups);
+        let normalisation = Estimate::from_sums(&groups);
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
         // a black scene has no state to start from: no chains, a black image
         let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);

@@ -293,38 +293,24 @@ impl<W: Default> Block<W> {
 /// What a block has seen; input of the [`Normalisers`](super::Normalisers).
 #[derive(Clone, Debug)]
 pub struct Statistics {
-    /// ln g of uniform points.
-    pub uniform: Histogram,
-    /// Σ g over uniform points.
-    pub uniform_sum: f64,
+    /// ln g of the states of each rung, weighted; of uniform points for rung 0, dark ones too.
+    pub rungs: Vec<Histogram>,
     /// Number of uniform points.
     pub uniform_points: u64,
-    /// ln g of states on tempered rungs, weighted.
-    pub tempered: Histogram,
-    /// Weight of states by rung; entry 0 stays 0.
-    pub weights: Vec<f64>,
     /// Weight of states that went to the film, all rungs.
     pub deposited: f64,
 }
 
 impl Statistics {
     fn new(rungs: usize) -> Statistics {
-        Statistics {
-            uniform: Histogram::default(),
-            uniform_sum: 0.0,
-            uniform_points: 0,
-            tempered: Histogram::default(),
-            weights: vec![0.0; rungs],
-            deposited: 0.0,
-        }
+        Statistics { rungs: vec![Histogram::default(); rungs], uniform_points: 0, deposited: 0.0 }
     }
 
     /// Records an independent sample; the film counts dark ones too.
     #[inline(always)]
     fn uniform_point(&mut self, point: &Contribution, recorder: &mut Recorder) {
-        self.uniform.add(point.ln_g, 1.0);
+        self.rungs[0].add(point.ln_g, 1.0);
         self.uniform_points += 1;
-        self.uniform_sum += point.g();
         recorder.splat(layer::UNIFORM, point, 1.0, 1.0);
     }
 }
@@ -338,8 +324,7 @@ fn record<'r>(
     recorder: &'r mut Recorder<'_>,
 ) -> impl FnMut(&Contribution, f64) {
     move |state, weight| {
-        seen.tempered.add(state.ln_g, weight);
-        seen.weights[k] += weight;
+        seen.rungs[k].add(state.ln_g, weight);
         let value = weights.tempered(k, state.ln_g);
         if value > 0.0 {
             seen.deposited += weight;

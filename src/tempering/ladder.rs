@@ -1,6 +1,6 @@
 //! The ladder and the acceptance of swaps on it.
 
-/// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1, K ≥ 2.
+/// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1; with K = 1 the uniform rung alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ladder {
     betas: Vec<f64>,
@@ -9,22 +9,26 @@ pub struct Ladder {
 impl Ladder {
     /// Most rungs of a ladder.
     pub const LONGEST: usize = 1024;
+    /// Least distance of rungs that [`DensityOfStates::place`](super::DensityOfStates::place) puts side by side.
+    pub const CLOSEST: f64 = 1e-12;
 
     /// A ladder of given inverse temperatures.
     ///
     /// # Panics
-    /// If they do not rise strictly from 0 to 1 or are more than [`LONGEST`](Self::LONGEST); what people give is
+    /// If they do not rise strictly from 0 to 1, or are more than [`LONGEST`](Self::LONGEST), or are a single one other
+    /// than 0; what people give is
     /// checked, with better words, by [`Settings`](crate::render::Settings).
     pub fn new(betas: Vec<f64>) -> Ladder {
-        assert!((2..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
-        assert!(betas[0] == 0.0 && betas[betas.len() - 1] == 1.0, "from {} to {}", betas[0], betas[betas.len() - 1]);
+        assert!((1..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
+        let last = betas[betas.len() - 1];
+        assert!(betas[0] == 0.0 && (last == 1.0 || betas.len() == 1), "from {} to {last}", betas[0]);
         assert!(betas.windows(2).all(|pair| pair[0] < pair[1]), "inverse temperatures must rise: {betas:?}");
         Ladder { betas }
     }
 
-    /// `rungs` equal steps from 0 to 1; 2 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
+    /// `rungs` rungs in equal steps from 0 to 1; 1 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).
     pub fn even(rungs: usize) -> Ladder {
-        Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1) as f64).collect())
+        Ladder::new((0..rungs).map(|k| k as f64 / (rungs - 1).max(1) as f64).collect())
     }
 
     /// The inverse temperatures.
@@ -61,6 +65,7 @@ mod tests {
 
     #[test]
     fn an_even_ladder_rises_from_the_uniform_distribution_to_the_target() {
+        assert_eq!(Ladder::even(1).betas(), [0.0]);
         assert_eq!(Ladder::even(2).betas(), [0.0, 1.0]);
         assert_eq!(Ladder::even(3).betas(), [0.0, 0.5, 1.0]);
     }

@@ -8,12 +8,23 @@
 
 mod block;
 mod combination;
+mod density;
+mod estimate;
 mod histogram;
 mod ladder;
+mod likelihood;
 mod normalisers;
+mod placement;
+mod stepping;
+#[cfg(test)]
+mod test_targets;
 
 pub use block::{Block, LAYERS, RungCounts, Statistics, layer};
 pub use combination::{Combination, Weights};
+pub use density::DensityOfStates;
+pub use estimate::{Estimate, uniform_mean};
 pub use histogram::Histogram;
 pub use ladder::{Ladder, swap_acceptance};
-pub use normalisers::{Estimate, Group, Normalisers, uniform_mean};
+pub use normalisers::Normalisers;
+pub use placement::rungs;
+pub use stepping::stepping_stones;
