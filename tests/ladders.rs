@@ -10,7 +10,7 @@ use relt::{
     sample::{Move, Points, Proposals, StepLaw},
     scene::Rgb,
     tempering::{
-        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, Statistics, Weights, layer, uniform_mean,
+        Block, Combination, Estimate, Histogram, LAYERS, Ladder, Normalisers, Statistics, Weights, layer, uniform_mean,
     },
 };
 
@@ -65,11 +65,7 @@ fn run<F: Fn(f32, f32) -> f32 + Sync>(
     let unit = 1.0;
 
     let solve = |blocks: &[Block<Vec<u32>>]| {
-        let groups: Vec<Group> = blocks
-            .iter()
-            .map(|b| b.recorded())
-            .map(|s| Group { uniform: &s.uniform, tempered: &s.tempered, weights: &s.weights })
-            .collect();
+        let groups: Vec<&[Histogram]> = blocks.iter().map(|b| b.recorded().rungs.as_slice()).collect();
         Normalisers::solve(&ladder, &groups)
     };
     let mut recorder = Recorder { footprint: &footprint, size, splats: &mut splats };
@@ -103,8 +99,8 @@ fn run<F: Fn(f32, f32) -> f32 + Sync>(
     let c = normalisers.target.value;
     let image = (0..COLUMNS as usize)
         .map(|i| hot[i][0] / (samples * uniform_draws as f64) + tempered[i][0] / samples * c / unit);
-    let sums: Vec<(f64, f64)> = statistics.iter().map(|s| (s.uniform_sum, s.uniform_points as f64)).collect();
-    Run { image: image.collect(), uniform: uniform_mean(&sums), normalisers, statistics }
+    let groups: Vec<&[Histogram]> = statistics.iter().map(|s| s.rungs.as_slice()).collect();
+    Run { image: image.collect(), uniform: uniform_mean(&groups), normalisers, statistics }
 }
 
 /// Two peaks of different width on a dim floor.
@@ -175,7 +171,8 @@ fn normalisers_of_all_rungs_agree_with_the_integrals() {
 fn every_rung_has_its_share_of_states() {
     let r = run(peaks, &[0.0, 0.3, 1.0], Combination::Balance, 2, 1000, 1);
     for s in &r.statistics {
-        assert!((s.weights[1] - s.weights[2]).abs() < 20.0, "{:?}", s.weights);
+        let weights = [1, 2].map(|k| s.rungs[k].total());
+        assert!((weights[0] - weights[1]).abs() < 20.0, "{weights:?}");
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
     sample::{Move, Points},
-    tempering::{Estimate, uniform_mean},
+    tempering::Estimate,
 };
 
 /// Independent samples of the first pass; half of the budget where that is less.
@@ -75,7 +75,7 @@ impl Mlt {
             bootstrap_samples,
             bootstrap_rays: batches.iter().map(|b| b.rays).sum(),
             bootstrap_faults: batches.iter().map(|b| b.faults).sum(),
-            first_estimate: uniform_mean(&bootstrap),
+            first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
         }
     }
@@ -99,7 +99,7 @@ impl Mlt {
             let group = &mut groups[i % self.blocks.len()];
             *group = (group.0 + batch.0, group.1 + batch.1);
         }
-        uniform_mean(&groups)
+        Estimate::from_sums(&groups)
     }
 }
 

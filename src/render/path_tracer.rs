@@ -12,7 +12,7 @@ use crate::{
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
     sample::{Move, Points, StepLaw},
-    tempering::uniform_mean,
+    tempering::Estimate,
 };
 
 /// The method at work.
@@ -100,7 +100,7 @@ impl Engine for PathTracer {
         Development {
             image,
             layers: vec![("density".into(), density)],
-            normalisation: Some(uniform_mean(&groups)),
+            normalisation: Some(Estimate::from_sums(&groups)),
             warnings: film_warnings(&self.film),
         }
     }

@@ -20,7 +20,7 @@ use crate::{
     film::{Accumulator, Filter, Plane, Splats},
     path::unidirectional::Workspace,
     tempering::{
-        Block, Combination, Estimate, Group, LAYERS, Ladder, Normalisers, RungCounts, Statistics, Weights, layer,
+        Block, Combination, Estimate, Histogram, LAYERS, Ladder, Normalisers, RungCounts, Statistics, Weights, layer,
         uniform_mean,
     },
 };
@@ -34,8 +34,6 @@ fn uniform_draws(ladder: &Ladder) -> usize {
 
 /// Independent samples from which chains start; a sixteenth of the run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
-/// Standard errors by which the uniform mean and MBAR may differ before the person is told.
-const ALARMING_DIFFERENCE: f64 = 3.0;
 
 /// The ladder that the settings ask for.
 pub fn ladder(settings: &Settings) -> Ladder {
@@ -149,12 +147,8 @@ impl ReplicaExchange {
 
 impl Pooled {
     fn solve(ladder: &Ladder, statistics: &[&Statistics]) -> Pooled {
-        let groups: Vec<Group> = statistics
-            .iter()
-            .map(|s| Group { uniform: &s.uniform, tempered: &s.tempered, weights: &s.weights })
-            .collect();
-        let sums: Vec<(f64, f64)> = statistics.iter().map(|s| (s.uniform_sum, s.uniform_points as f64)).collect();
-        Pooled { normalisers: Normalisers::solve(ladder, &groups), uniform: uniform_mean(&sums) }
+        let groups: Vec<&[Histogram]> = statistics.iter().map(|s| s.rungs.as_slice()).collect();
+        Pooled { normalisers: Normalisers::solve(ladder, &groups), uniform: uniform_mean(&groups) }
     }
 }
 
@@ -279,9 +273,7 @@ impl Pooled {
     /// Says when the two estimates of c contradict each other: what the chains do not find, MBAR does not count.
     fn warnings(&self) -> Vec<String> {
         let (uniform, mbar) = (self.uniform, self.normalisers.target);
-        let error = uniform.standard_error.hypot(mbar.standard_error);
-        let difference = (uniform.value - mbar.value).abs();
-        if difference <= ALARMING_DIFFERENCE * error || error.is_nan() {
+        if !uniform.contradicts(&mbar) {
             return Vec::new();
         }
         vec![format!(

@@ -9,11 +9,14 @@ pub struct Ladder {
 impl Ladder {
     /// Most rungs of a ladder.
     pub const LONGEST: usize = 1024;
+    /// Least distance of rungs that [`DensityOfStates::place`](super::DensityOfStates::place) puts side by side.
+    pub const CLOSEST: f64 = 1e-12;
 
     /// A ladder of given inverse temperatures.
     ///
     /// # Panics
-    /// If they do not rise strictly from 0 to 1 or are more than [`LONGEST`](Self::LONGEST); what people give is
+    /// If they do not rise strictly from 0 to 1, or are more than [`LONGEST`](Self::LONGEST), or are a single one other
+    /// than 0; what people give is
     /// checked, with better words, by [`Settings`](crate::render::Settings).
     pub fn new(betas: Vec<f64>) -> Ladder {
         assert!((1..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());

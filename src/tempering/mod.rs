@@ -7,15 +7,39 @@
 //! fresh points, some every sweep, each of which is offered to the rung above.
 
 mod block;
-mod combination;
+mod choices;
+mod density;
+mod estimate;
 mod histogram;
+mod independent;
 mod ladder;
+mod likelihood;
 mod normalisers;
+mod placement;
+mod probes;
 mod report;
+mod sampler;
+mod stepping;
+mod steps;
+mod tally;
+#[cfg(test)]
+mod test_targets;
+mod trips;
+mod tuning;
+mod weights;
 
-pub use block::{Block, LAYERS, RungCounts, Statistics, layer};
-pub use combination::{Combination, Weights};
+pub use block::Block;
+pub use choices::{Choices, Combine, LadderChoice};
+pub use density::DensityOfStates;
+pub use estimate::{Estimate, uniform_mean};
 pub use histogram::Histogram;
 pub use ladder::{Ladder, swap_acceptance};
-pub use normalisers::{Estimate, Group, Normalisers, uniform_mean};
+pub use normalisers::Normalisers;
+pub use placement::rungs;
+pub use probes::{ProbeMap, Probes};
 pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungReport, ScaleReport};
+pub use sampler::{Development, Learnt, Sampler, Setup};
+pub use stepping::stepping_stones;
+pub use steps::StepMix;
+pub use tally::{Canvas, Layers, Round, RungCounts, Tally};
+pub use weights::Weights;
