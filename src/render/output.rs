@@ -65,7 +65,7 @@ impl Output {
 /// Texts: `scene`, `method`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
 /// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold).
 /// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation` and `normalisation_error`.
-/// Of the last round of replica exchange, with the meanings in [`RoundReport`]: see [`ladder`].
+/// `ladder.NAME`: the last round of replica exchange, with the meanings in [`RoundReport`].
 pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     let mut data: Vec<(&str, Value)> = vec![
         ("scene", start.scene.as_str().into()),
