@@ -54,6 +54,7 @@ fn a_ladder_needs_replica_exchange() {
         refused(&["--method", method, "--replicas", "4"], &["--replicas", method, "no ladder"]);
         refused(&["--method", method, "--betas", "0,1"], &["--betas", method, "no ladder"]);
         refused(&["--method", method, "--combine", "target"], &["--combine", method, "no ladder"]);
+        refused(&["--method", method, "--verbose"], &["--verbose", method, "no ladder"]);
     }
     refused(&["--method", "magic"], &["magic", "path", "mlt", "re"]);
     refused(&["--combine", "median"], &["median", "target", "balance"]);

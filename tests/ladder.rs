@@ -56,7 +56,7 @@ fn report(round: u32, betas: &[f64]) -> RoundReport {
         image_share: [0.1, 0.2, 0.3, 0.4, 0.0, 0.0][i.min(5)],
     };
     let walk = |start: usize| {
-        let (mut at, mut up) = (start, start % 2 == 0);
+        let (mut at, mut up) = (start, start.is_multiple_of(2));
         let mut step = |i: usize| {
             if !(i * 7 + start * 3).is_multiple_of(5) {
                 up = if at + 1 == k { false } else { at == 0 || up };

@@ -181,6 +181,7 @@ impl Render {
             ("--replicas", self.replicas.is_some()),
             ("--betas", self.betas.is_some()),
             ("--combine", self.combine.is_some()),
+            ("--verbose", self.verbose),
         ];
         if self.method != Method::ReplicaExchange {
             let method = self.method.name();

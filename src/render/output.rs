@@ -68,7 +68,7 @@ impl Output {
 /// `normalisation_from` and `kelemen_weights` (true or false).
 /// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error` and for `mlt`
 /// `large_steps`.
-/// Of the last round of replica exchange, with the meanings in [`RoundReport`]: see [`ladder`].
+/// `ladder.NAME`: the last round of replica exchange, with the meanings in [`RoundReport`].
 pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     let mut data: Vec<(&str, Value)> = vec![
         ("scene", start.scene.as_str().into()),

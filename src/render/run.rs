@@ -225,3 +225,95 @@ fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{path::Path, sync::Mutex};
+
+    use super::*;
+    use crate::{
+        embree::{Device, Width},
+        film::Image,
+        render::engine::{Counts, Development},
+    };
+
+    /// Three sweeps, of which the first ends rounds 0 and 1 and the second round 2.
+    struct Rounds {
+        sweeps: u64,
+        reports: Vec<RoundReport>,
+    }
+
+    impl Engine for Rounds {
+        fn sweeps_wanted(&self) -> Option<u64> {
+            Some(3)
+        }
+
+        fn mutations_wanted(&self) -> Option<u64> {
+            Some(3)
+        }
+
+        fn advance(&mut self, _: &Stage, sweeps: u64) {
+            for sweep in self.sweeps..self.sweeps + sweeps {
+                let ended = [&[0, 1][..], &[2], &[]][sweep as usize];
+                self.reports.extend(ended.iter().map(|&round| RoundReport { round, ..RoundReport::default() }));
+            }
+            self.sweeps += sweeps;
+        }
+
+        fn counts(&self) -> Counts {
+            Counts { mutations: self.sweeps, ..Counts::default() }
+        }
+
+        fn develop(&self, _: &Stage) -> Development {
+            let image = Image::constant(1, 1, [1.0; 3]);
+            Development { image, layers: Vec::new(), normalisation: None, warnings: Vec::new() }
+        }
+
+        fn take_reports(&mut self) -> Vec<RoundReport> {
+            std::mem::take(&mut self.reports)
+        }
+    }
+
+    /// Notes rounds, and the last round of each status.
+    #[derive(Default)]
+    struct Notes {
+        rounds: Mutex<Vec<u32>>,
+        last: Mutex<Vec<Option<u32>>>,
+    }
+
+    impl Observer for Notes {
+        fn progress(&self, status: &Status) {
+            self.last.lock().unwrap().push(status.last_round.as_ref().map(|report| report.round));
+        }
+
+        fn round(&self, report: &RoundReport) {
+            self.rounds.lock().unwrap().push(report.round);
+        }
+    }
+
+    #[test]
+    fn rounds_reach_the_observer_in_order_and_the_last_one_the_image() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.xml");
+        let description = crate::load::scene(&path, &[("res".into(), "4".into())]).unwrap();
+        let scene = Scene::new(&Device::new("").unwrap(), description).unwrap();
+        let settings = Settings { mutations_per_pixel: None, ..Settings::default() };
+        let job = Job { scene: &scene, scene_name: "box".into(), settings, stop: &AtomicBool::new(false) };
+        let stage = Stage {
+            mapping: Mapping::new(&scene, Widths { camera: Width::W1, bounce: Width::W1, shadow: Width::W1 }),
+            footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
+            rng: Rng::new(0),
+        };
+        let (mut engine, start) = (Rounds { sweeps: 0, reports: Vec::new() }, RunStart::default());
+        let notes = Notes::default();
+        let end = work(&job, &stage, &mut engine, &start, &notes, Instant::now());
+        assert_eq!(*notes.rounds.lock().unwrap(), [0, 1, 2]);
+        let last = notes.last.lock().unwrap();
+        assert_eq!((last.first(), last.last()), (Some(&Some(1)), Some(&Some(2))), "{last:?}");
+        let outcome = conclude(&job, &stage, &mut engine, &start, end, Instant::now());
+        assert!(
+            outcome.picture.metadata.contains(&("ladder.round".into(), 2.0.into())),
+            "{:?}",
+            outcome.picture.metadata
+        );
+    }
+}

@@ -280,11 +280,11 @@ enum Scale {
 const FOR_ZERO: f64 = 0.1;
 
 impl Axis {
-    /// From `low` to `high`, widened to the next ticks.
+    /// From `low` to `high`, widened to the next ticks; 0 to 1 where both are 0 or one is not finite.
     pub fn linear(label: &str, [low, high]: [f64; 2]) -> Axis {
         let [low, high] = match high - low {
-            span if !span.is_finite() => [0.0, 1.0],
-            span if span <= 1e-12 * high.abs() => [low - 0.5 * low.abs().max(1.0), high + 0.5 * high.abs().max(1.0)],
+            span if !span.is_finite() || low == 0.0 && high == 0.0 => [0.0, 1.0],
+            span if span <= 1e-12 * high.abs() => [low - 0.5 * low.abs(), high + 0.5 * high.abs()],
             _ => [low, high],
         };
         let step = nice_step((high - low) / 5.0);
@@ -389,6 +389,7 @@ mod tests {
             "a single value has some room around it"
         );
         assert_eq!(names(&Axis::linear("", [f64::INFINITY, f64::NEG_INFINITY])).len(), 6, "no value at all");
+        assert_eq!(names(&Axis::linear("", [0.0, 0.0])).first(), Some(&"0.0"), "what is never negative stays so");
         assert_eq!(names(&Axis::whole("", [1, 4])), ["1", "2", "3", "4"]);
         assert_eq!(names(&Axis::whole("", [1, 64])), ["1", "10", "20", "30", "40", "50", "60"]);
         assert_eq!(
