@@ -31,6 +31,8 @@ pub struct Evaluator<W> {
     law: StepLaw,
     /// How each lane moves next.
     pub moves: Vec<Move>,
+    /// Width and height in pixels of the film that stratified points are for; one pixel at first.
+    pub film: [u32; 2],
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
     /// The proposed points.
@@ -53,6 +55,7 @@ impl<W: Default> Evaluator<W> {
             rng,
             law,
             moves: vec![Move::Rest; lanes],
+            film: [1, 1],
             counters,
             points: Points::new(lanes),
             out: Contributions::new(lanes),
@@ -79,6 +82,7 @@ impl<W: Default> Evaluator<W> {
             counters: &self.counters,
             moves: &self.moves,
             law: self.law,
+            film: self.film,
         };
         target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
     }
