@@ -19,16 +19,22 @@ pub enum Purpose {
     Bootstrap = 3,
     /// Choice of the states that chains start from.
     Start = 4,
+    /// Stratified points, beyond their low-discrepancy blocks.
+    Stratified = 5,
+    /// Scrambles of the low-discrepancy blocks.
+    Scramble = 6,
+    /// Turns that blocks take at the pixels.
+    Turn = 7,
 }
 
 /// Identifies one call for four random words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter {
-    /// The ladder (for chains without ladder, the chain).
+    /// The ladder (for chains without ladder, the chain; for stratified points, the pixel).
     pub ladder: u32,
     /// The replica on its ladder, or the uniform draw.
     pub replica: u16,
-    /// The step of that replica, < 2⁵⁶.
+    /// The step of that replica (for stratified points, the number in the pixel), < 2⁵⁶.
     pub step: u64,
     /// The stream.
     pub purpose: Purpose,

@@ -131,6 +131,11 @@ impl<W: Default> Baseline<W> {
         }
     }
 
+    /// Steps of each chain so far.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
     /// Mutations so far.
     pub fn mutations(&self) -> u64 {
         self.steps * self.walkers.states.len() as u64

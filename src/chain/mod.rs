@@ -2,6 +2,7 @@
 
 mod baseline;
 mod metropolis;
+mod plan;
 mod recorder;
 mod start;
 mod target;
@@ -9,6 +10,7 @@ mod walkers;
 
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, baseline_layer};
 pub use metropolis::acceptance;
+pub use plan::Plan;
 pub use recorder::Recorder;
 pub use start::{Start, replay, resample};
 pub use target::{Evaluator, Target};

@@ -43,7 +43,8 @@ pub fn resample(samples: &[Start], beta: f64, chains: usize, rng: Rng, stream: u
     starts
 }
 
-/// Puts chains into those states by replaying the samples; lanes beyond `starts` are not touched.
+/// Puts chains into those states by replaying the samples, stratified ones for `evaluator.film`; lanes beyond `starts`
+/// are not touched.
 ///
 /// # Panics
 /// If a replayed sample does not give the same luminance: the target is not a function of its point.
@@ -51,7 +52,10 @@ pub fn replay<T: Target>(target: &T, starts: &[Start], walkers: &mut Walkers, ev
     let counters = evaluator.counters.clone();
     evaluator.moves.fill(Move::Rest);
     for (lane, start) in starts.iter().enumerate() {
-        evaluator.moves[lane] = Move::Fresh;
+        evaluator.moves[lane] = match start.counter.purpose {
+            Purpose::Stratified => Move::Stratified,
+            _ => Move::Fresh,
+        };
         evaluator.counters[lane] = start.counter;
     }
     evaluator.evaluate(target, &walkers.points);

@@ -30,6 +30,8 @@ pub struct Evaluator<W> {
     rng: Rng,
     /// How each lane moves next.
     pub moves: Vec<Move>,
+    /// Width and height in pixels of the film that stratified points are for; one pixel at first.
+    pub film: [u32; 2],
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
     /// The proposed points.
@@ -51,6 +53,7 @@ impl<W: Default> Evaluator<W> {
         Evaluator {
             rng,
             moves: vec![Move::Rest; lanes],
+            film: [1, 1],
             counters,
             points: Points::new(lanes),
             out: Contributions::new(lanes),
@@ -76,6 +79,7 @@ impl<W: Default> Evaluator<W> {
             points: &mut self.points,
             counters: &self.counters,
             moves: &self.moves,
+            film: self.film,
         };
         target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
     }

@@ -12,7 +12,7 @@ use crate::film::{Accumulator, Filter};
 use crate::path::Layout;
 use crate::scene::description::FilmDescription;
 use crate::scene::{Features, Kernel, Scene, materials};
-use crate::tempering::LAYERS;
+use crate::tempering::{Choices, Layers};
 
 /// Prints what a scene uses, and what is therefore left out
 #[derive(Args)]
@@ -68,7 +68,7 @@ fn film(film: &FilmDescription) -> Vec<String> {
     };
     vec![
         format!("{} × {} pixels, {filter}", film.width, film.height),
-        format!("memory: {:.1} MiB for path and mlt, {:.1} MiB for re", mebibytes(1), mebibytes(LAYERS)),
+        format!("memory: {:.1} MiB for path and mlt, {:.1} MiB for re", mebibytes(1), mebibytes(Layers::of(&Choices::default(), 2).count)),
     ]
 }
 

@@ -52,18 +52,28 @@ pub(super) struct Render {
     #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
     method: Method,
 
-    /// Replicas on a ladder for --method re, 2 to 1024, the uniform one included [default: 3]
-    #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Method")]
-    replicas: Option<u32>,
+    /// Replicas on a ladder for --method re, 1 to 1024, the uniform one included, placed at equal rejection of swaps;
+    /// auto: as many as pay, none but the uniform one where path tracing is best [default: auto]
+    #[arg(long, value_name = "K", value_parser = values::replicas, allow_hyphen_values = true, help_heading = "Method")]
+    replicas: Option<LadderChoice>,
 
     /// Inverse temperatures for --method re in place of --replicas, rising from 0 to 1, such as 0,0.3,1
     #[arg(long, value_name = "0,…,1", value_delimiter = ',', allow_negative_numbers = true, help_heading = "Method")]
     betas: Option<Vec<f64>>,
 
-    /// How --method re makes one image of its replicas; balance: from all of them; target: from the coldest
+    /// Share of evaluations of --method re that are uniform points, between 0 and 1 [default: tuned to the scene]
+    #[arg(long, value_name = "F", allow_negative_numbers = true, help_heading = "Method")]
+    uniform_share: Option<f64>,
+
+    /// How --method re makes one image of its replicas; balance: all samples of all, weighed; target: the coldest's;
+    /// uniform: the uniform one's; max, power, median, median-printed: the paper's heuristics of the latter two, biased
     /// [default: balance]
     #[arg(long, value_parser = values::combine(), help_heading = "Method")]
     combine: Option<Combine>,
+
+    /// Adds to the .exr of --method re the images of the uniform and the coldest replica, and each rung's part
+    #[arg(long, help_heading = "Files")]
+    layers: bool,
 
     /// Probability of a large step for --method mlt, between 0 and 1 [default: 0.3]
     #[arg(long, value_name = "P", allow_negative_numbers = true, help_heading = "Method")]
@@ -150,12 +160,14 @@ impl Render {
             pin: self.pin,
             mutations_per_pixel: if no_budget { Some(DEFAULT_MUTATIONS_PER_PIXEL) } else { self.mpp },
             time: self.time,
-            ladder: match (&self.betas, self.replicas) {
+            ladder: match (&self.betas, &self.replicas) {
                 (Some(betas), _) => LadderChoice::Betas(betas.clone()),
-                (None, Some(k)) => LadderChoice::Replicas(k),
+                (None, Some(replicas)) => replicas.clone(),
                 (None, None) => LadderChoice::default(),
             },
             combine: self.combine.unwrap_or_default(),
+            uniform_share: self.uniform_share,
+            layers: self.layers,
             mlt: MltSettings {
                 large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
                 normalisation: self.normalisation.unwrap_or_default(),
@@ -181,6 +193,8 @@ impl Render {
             ("--replicas", self.replicas.is_some()),
             ("--betas", self.betas.is_some()),
             ("--combine", self.combine.is_some()),
+            ("--uniform-share", self.uniform_share.is_some()),
+            ("--layers", self.layers),
             ("--verbose", self.verbose),
         ];
         if self.method != Method::ReplicaExchange {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::embree::Width;
-use crate::render::{Combine, Method, Normalisation, PacketChoice};
+use crate::render::{Combine, LadderChoice, Method, Normalisation, PacketChoice};
 
 /// `name=value`.
 pub(super) fn define(text: &str) -> Result<(String, String), String> {
@@ -33,6 +33,13 @@ pub(super) fn interval(text: &str) -> Result<Duration, String> {
 
 pub(super) fn method() -> impl TypedValueParser<Value = Method> {
     one_of(&Method::ALL, |method| method.name())
+}
+
+pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {
+    match text {
+        "auto" => Ok(LadderChoice::Auto),
+        _ => text.parse().map(LadderChoice::Replicas).map_err(|_| "accepted are auto and numbers from 1 to 1024".into()),
+    }
 }
 
 pub(super) fn combine() -> impl TypedValueParser<Value = Combine> {

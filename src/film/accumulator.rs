@@ -239,6 +239,17 @@ impl Accumulator {
         sums
     }
 
+    /// The same with splats that are not on the film yet.
+    pub fn layer_with(&self, layer: usize, pending: &Splats) -> Vec<[f64; 4]> {
+        let mut sums = self.layer(layer);
+        for splat in pending.layer(layer) {
+            let [r, g, b] = splat.rgb;
+            let sum = &mut sums[splat.pixel as usize];
+            sum.iter_mut().zip([r, g, b, splat.weight]).for_each(|(s, v)| *s += f64::from(v));
+        }
+        sums
+    }
+
     /// Number of splats that exceeded what a pixel holds, or were not finite; their pixels are not exact.
     pub fn overflowed(&self) -> u64 {
         self.overflowed.load(Relaxed)

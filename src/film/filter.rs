@@ -71,6 +71,11 @@ type Reach = std::ops::RangeInclusive<i64>;
 const COLUMNS_AT_ONCE: usize = 16;
 
 impl Footprint {
+    /// Whether every film position goes to one pixel.
+    pub fn is_box(&self) -> bool {
+        self.bell.is_none()
+    }
+
     /// Prepares the filter for a film.
     ///
     /// # Panics

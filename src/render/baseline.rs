@@ -5,12 +5,11 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Stage, film_warnings, layer_with, mean},
-    plan::Plan,
+    engine::{Counts, Development, Engine, Stage, film_warnings, mean},
     settings::{MltSettings, Normalisation},
 };
 use crate::{
-    chain::{Baseline, Evaluator, LargeSteps, Start, baseline_layer, resample},
+    chain::{Baseline, Evaluator, LargeSteps, Plan, Start, baseline_layer, resample},
     film::{Accumulator, Plane, Splats},
     path::unidirectional::Workspace,
     rng::{Counter, Purpose},
@@ -135,15 +134,20 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
 }
 
 impl Engine for Mlt {
-    fn sweeps_wanted(&self) -> Option<u64> {
-        if self.blocks.is_empty() { Some(0) } else { self.plan.sweeps }
+    fn sweeps_left(&self) -> Option<u64> {
+        match self.blocks.first() {
+            Some(block) => self.plan.sweeps.map(|sweeps| sweeps - block.chains.steps()),
+            None => Some(0),
+        }
     }
 
     fn mutations_wanted(&self) -> Option<u64> {
-        self.sweeps_wanted().map(|s| s * self.plan.a_sweep() + self.bootstrap_samples)
+        let sweeps = if self.blocks.is_empty() { Some(0) } else { self.plan.sweeps };
+        sweeps.map(|s| s * self.plan.a_sweep() + self.bootstrap_samples)
     }
 
     fn advance(&mut self, stage: &Stage, sweeps: u64) {
+        let sweeps = sweeps.min(self.sweeps_left().unwrap_or(u64::MAX));
         let (film, unit) = (&self.film, self.unit());
         self.blocks.par_iter_mut().for_each(|block| {
             block.chains.advance(&stage.mapping, sweeps, unit, &mut stage.recorder(&mut block.splats));
@@ -178,14 +182,14 @@ impl Engine for Mlt {
         for block in &self.blocks {
             block.chains.record_pending(self.unit(), &mut stage.recorder(&mut splats));
         }
-        let mut sums = layer_with(&self.film, &splats, baseline_layer::CHAINS);
+        let mut sums = self.film.layer_with(baseline_layer::CHAINS, &splats);
         let normalisation = self.normalisation();
         if self.pools && self.unit() > 0.0 {
             let later = normalisation.value / self.unit();
             sums.iter_mut().flat_map(|sum| &mut sum[..3]).for_each(|value| *value *= later);
         }
         if self.large_steps.kelemen_weights {
-            let proposals = layer_with(&self.film, &splats, baseline_layer::LARGE_STEPS);
+            let proposals = self.film.layer_with(baseline_layer::LARGE_STEPS, &splats);
             sums.iter_mut().flatten().zip(proposals.iter().flatten()).for_each(|(sum, value)| *sum += value);
         }
         let steps: u64 = self.blocks.iter().map(|b| b.chains.mutations()).sum();

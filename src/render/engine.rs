@@ -78,14 +78,14 @@ pub struct Counts {
     pub swap: Vec<f64>,
 }
 
-/// A method at work. Sweeps are counted from 0; all state is a function of the job and the sweeps done, never of the
-/// threads or of how the sweeps were sliced.
+/// A method at work. All state is a function of the job and the sweeps done, never of the threads or of how the sweeps
+/// were sliced.
 pub trait Engine: Send {
-    /// Sweeps to go through in all; `None`: for as long as time allows.
-    fn sweeps_wanted(&self) -> Option<u64>;
+    /// Sweeps still to go through, as long as sweeps are now; `None`: for as long as time allows.
+    fn sweeps_left(&self) -> Option<u64>;
     /// Evaluations that the whole run takes, where it is limited.
     fn mutations_wanted(&self) -> Option<u64>;
-    /// Goes through `sweeps` more sweeps, in parallel over blocks on the current thread pool.
+    /// Goes through `sweeps` more sweeps, or those left, in parallel over blocks on the current thread pool.
     fn advance(&mut self, stage: &Stage, sweeps: u64);
     /// Counts so far.
     fn counts(&self) -> Counts;
@@ -95,17 +95,6 @@ pub trait Engine: Send {
     fn take_reports(&mut self) -> Vec<RoundReport> {
         Vec::new()
     }
-}
-
-/// Σ rgb and Σ weight of every pixel of a layer, with splats that are not on the film yet.
-pub fn layer_with(film: &Accumulator, pending: &Splats, layer: usize) -> Vec<[f64; 4]> {
-    let mut sums = film.layer(layer);
-    for splat in pending.layer(layer) {
-        let [r, g, b] = splat.rgb;
-        let sum = &mut sums[splat.pixel as usize];
-        sum.iter_mut().zip([r, g, b, splat.weight]).for_each(|(s, v)| *s += f64::from(v));
-    }
-    sums
 }
 
 /// What the person should know about a film: sums beyond its range, which stay at its end.

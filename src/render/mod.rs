@@ -5,8 +5,6 @@ pub mod calibration;
 pub mod engine;
 pub mod log;
 pub mod output;
-mod path_tracer;
-mod plan;
 pub mod progress;
 mod replica_exchange;
 mod run;

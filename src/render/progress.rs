@@ -164,11 +164,12 @@ pub fn heading(start: &RunStart) -> String {
         Method::Path => words.push("path tracing".into()),
         Method::Mlt => words.push("Metropolis".into()),
         Method::ReplicaExchange => {
-            let replicas = match &settings.ladder {
-                LadderChoice::Replicas(k) => *k as usize,
-                LadderChoice::Betas(betas) => betas.len(),
-            };
-            words.push(format!("replica exchange with {replicas} replicas"));
+            words.push(match &settings.ladder {
+                LadderChoice::Auto => "replica exchange".into(),
+                LadderChoice::Replicas(1) => "replica exchange with the uniform replica alone".into(),
+                LadderChoice::Replicas(k) => format!("replica exchange with {k} replicas"),
+                LadderChoice::Betas(betas) => format!("replica exchange with {} replicas", betas.len()),
+            });
         }
     }
     let mpp = settings.mutations_per_pixel.map(|mpp| format!("{mpp} mutations per pixel"));

@@ -13,8 +13,7 @@ use super::{
     calibration,
     engine::{Engine, Stage},
     output::{Picture, metadata},
-    path_tracer::PathTracer,
-    replica_exchange::{self, ReplicaExchange},
+    replica_exchange::ReplicaExchange,
     settings::{Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, Status},
 };
@@ -106,9 +105,8 @@ fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderErr
 /// The method of those settings, ready to work on `mutations` evaluations or without end.
 pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
     match settings.method {
-        Method::Path => Box::new(PathTracer::new(stage, mutations)),
         Method::Mlt => Box::new(Mlt::new(stage, &settings.mlt, mutations)),
-        Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
+        Method::Path | Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
     }
 }
 
@@ -130,10 +128,9 @@ fn work(
     begin: Instant,
 ) -> End {
     let mut last_round = None;
-    let mut done = 0;
     let mut slice = 1;
     loop {
-        let left = engine.sweeps_wanted().map_or(u64::MAX, |wanted| wanted - done);
+        let left = engine.sweeps_left().unwrap_or(u64::MAX);
         let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(begin.elapsed()));
         if left == 0 || time_left.is_zero() {
             return End { interrupted: false, last_round };
@@ -144,7 +141,6 @@ fn work(
         let slice_begin = Instant::now();
         let sweeps = slice.min(left);
         engine.advance(stage, sweeps);
-        done += sweeps;
         // the next slice fills its time, or what is left of the run's
         let a_sweep = slice_begin.elapsed().as_secs_f64() / sweeps as f64;
         let next = SLICE.min(job.settings.time.map_or(SLICE, |time| time.saturating_sub(begin.elapsed())));
@@ -211,10 +207,7 @@ fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
         height: job.scene.film.height,
         settings: job.settings.clone(),
         threads,
-        betas: match job.settings.method {
-            Method::ReplicaExchange => replica_exchange::ladder(&job.settings).betas().to_vec(),
-            Method::Path | Method::Mlt => Vec::new(),
-        },
+        betas: job.settings.betas_given().to_vec(),
         features: job.scene.features.in_words(),
         embree: format!("{major}.{minor}.{patch}"),
         embree_library: device.library_path().display().to_string(),
@@ -244,8 +237,8 @@ mod tests {
     }
 
     impl Engine for Rounds {
-        fn sweeps_wanted(&self) -> Option<u64> {
-            Some(3)
+        fn sweeps_left(&self) -> Option<u64> {
+            Some(3 - self.sweeps)
         }
 
         fn mutations_wanted(&self) -> Option<u64> {

@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::chain::LARGE_STEP_PROBABILITY;
 use crate::embree::Width;
+pub use crate::tempering::{Choices, Combine, LadderChoice};
 
 /// How the image is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -33,49 +34,6 @@ impl Method {
             Method::Path => "path",
             Method::Mlt => "mlt",
             Method::ReplicaExchange => "re",
-        }
-    }
-}
-
-/// The inverse temperatures of replica exchange.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LadderChoice {
-    /// So many rungs, the uniform one included, placed by relt.
-    Replicas(u32),
-    /// These, rising from 0 to 1.
-    Betas(Vec<f64>),
-}
-
-impl Default for LadderChoice {
-    /// Three rungs. relMSE at 60 mutations per pixel, median of three seeds, K = 2, 3, 4, 6: `cornell-box` 0.0107,
-    /// 0.0094, 0.0094, 0.0095; `caustic` 0.41, 0.36, 0.46, 0.41; `lattice` 1.06, 0.96, 0.86, 0.82 (all with one
-    /// uniform point a sweep).
-    fn default() -> LadderChoice {
-        LadderChoice::Replicas(3)
-    }
-}
-
-/// How the estimates of the rungs become one image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Combine {
-    /// Only the rung β = 1, times the normalisation.
-    Target,
-    /// All samples of all rungs, weighed by the balance heuristic.
-    #[default]
-    Balance,
-}
-
-impl Combine {
-    /// Both.
-    pub const ALL: [Combine; 2] = [Combine::Balance, Combine::Target];
-
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Combine::Target => "target",
-            Combine::Balance => "balance",
         }
     }
 }
@@ -169,6 +127,10 @@ pub struct Settings {
     pub ladder: LadderChoice,
     /// Combination of the rungs, for replica exchange.
     pub combine: Combine,
+    /// Share of evaluations that are uniform points, for replica exchange; tuned where absent.
+    pub uniform_share: Option<f64>,
+    /// Write every rung's part of the image, for replica exchange.
+    pub layers: bool,
     /// Large steps and their use, for `mlt`.
     pub mlt: MltSettings,
     /// Rays at a time.
@@ -189,6 +151,8 @@ impl Default for Settings {
             time: None,
             ladder: LadderChoice::default(),
             combine: Combine::default(),
+            uniform_share: None,
+            layers: false,
             mlt: MltSettings::default(),
             packet: PacketChoice::default(),
         }
@@ -205,14 +169,34 @@ const LONGEST: Duration = Duration::from_secs(365 * 24 * 3600);
 const MOST_THREADS: usize = 4096;
 
 impl Settings {
+    /// What is chosen about replica exchange.
+    pub fn ladder_choices(&self) -> Choices {
+        Choices {
+            ladder: self.ladder.clone(),
+            combine: self.combine,
+            uniform_share: self.uniform_share,
+            layers: self.layers,
+        }
+    }
+
+    /// The inverse temperatures that were asked for by number; none where relt places them.
+    pub fn betas_given(&self) -> &[f64] {
+        match (&self.method, &self.ladder) {
+            (Method::ReplicaExchange, LadderChoice::Betas(betas)) => betas,
+            _ => &[],
+        }
+    }
+
     /// Every contradiction, one sentence each in the words of the command line; none if the settings make sense.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if self.method == Method::ReplicaExchange {
             match &self.ladder {
+                LadderChoice::Auto => {}
                 LadderChoice::Replicas(k) => faults.extend(replicas_fault(*k)),
                 LadderChoice::Betas(betas) => betas_faults(betas, &mut faults),
             }
+            faults.extend(self.uniform_share.and_then(uniform_share_fault));
         }
         if self.method == Method::Mlt {
             faults.extend(large_steps_fault(self.mlt.large_steps));
@@ -255,13 +239,23 @@ impl Settings {
 
 fn replicas_fault(k: u32) -> Option<String> {
     match k {
-        0 | 1 => Some(format!(
-            "--replicas {k}: the number counts the uniform replica, so replica exchange needs at least 2; \
-             for uniform sampling alone use --method path"
-        )),
-        2..=MOST_REPLICAS => None,
+        0 => Some(
+            "--replicas 0: the number counts the uniform replica, which is always there; 1 is uniform sampling alone"
+                .into(),
+        ),
+        1..=MOST_REPLICAS => None,
         _ => Some(format!("--replicas {k}: at most {MOST_REPLICAS} replicas")),
     }
+}
+
+fn uniform_share_fault(share: f64) -> Option<String> {
+    let accepted = share > 0.0 && share < 1.0;
+    (!accepted).then(|| {
+        format!(
+            "--uniform-share {share}: the share must be above 0, or nothing normalises the image, and below 1; for uniform \
+             sampling alone use --method path"
+        )
+    })
 }
 
 fn betas_faults(betas: &[f64], faults: &mut Vec<String>) {

@@ -8,10 +8,14 @@
 mod mutation;
 mod points;
 mod proposals;
+mod sobol;
+mod strata;
 
 pub use mutation::StepLaw;
 pub use points::Points;
 pub use proposals::{Move, Proposals};
+pub use sobol::LOW_DISCREPANCY_BLOCKS;
+pub use strata::{PixelOrder, StratifiedPoints};
 
 /// Four primary dimensions.
 pub type Block = [u32; 4];

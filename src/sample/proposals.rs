@@ -1,6 +1,10 @@
 //! Proposed points, drawn block by block as paths reach them.
 
-use super::{Block, Points, StepLaw};
+use super::{
+    Block, Points, StepLaw,
+    sobol::{self, LOW_DISCREPANCY_BLOCKS},
+    strata::within_pixel,
+};
 use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
 
 /// How a lane's proposal comes about.
@@ -8,8 +12,9 @@ use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
 pub enum Move {
     /// A uniform point of the cube.
     Fresh,
-    /// A uniform point, but its first block is already set (stratified film positions).
-    FreshAfterFirst,
+    /// The point of a pixel that the lane's counter names: `ladder` the pixel, `step` the number of the point in it.
+    /// Its film position lies in the pixel and its first blocks are low-discrepancy over the points of the pixel.
+    Stratified,
     /// A small step of this law from the lane's current point.
     Small(StepLaw),
     /// The lane rests; nothing is drawn or evaluated.
@@ -31,6 +36,9 @@ pub struct Proposals<'a> {
     pub counters: &'a [Counter],
     /// How each lane moves.
     pub moves: &'a [Move],
+    /// Width and height in pixels of the film that stratified points are for; beyond 1 × 1 pixels, the first two
+    /// dimensions are their film position.
+    pub film: [u32; 2],
 }
 
 impl Proposals<'_> {
@@ -43,13 +51,10 @@ impl Proposals<'_> {
     pub fn begin(&mut self, live: &mut Vec<u32>) {
         live.clear();
         for (lane, m) in self.moves.iter().enumerate() {
-            if *m == Move::Rest {
-                continue;
-            }
-            if *m != Move::FreshAfterFirst {
+            if *m != Move::Rest {
                 self.points.clear(lane);
+                live.push(lane as u32);
             }
-            live.push(lane as u32);
         }
     }
 
@@ -59,22 +64,48 @@ impl Proposals<'_> {
         self.points.reserve(block);
         let (together, rest) = lanes.as_chunks::<SIDE_BY_SIDE>();
         for lanes in together {
-            let words = self.rng.words_side_by_side(lanes.map(|lane| self.counters[lane as usize]), block);
+            let counters = lanes.map(|lane| self.counters[lane as usize]);
+            let words = match lanes.iter().filter(|lane| self.low_discrepancy(block, **lane)).count() {
+                0 => self.rng.words_side_by_side(counters, block),
+                SIDE_BY_SIDE => sobol::words_side_by_side(self.rng, counters, block),
+                _ => {
+                    lanes.iter().for_each(|lane| self.draw_one(block, *lane));
+                    continue;
+                }
+            };
             for (j, &lane) in lanes.iter().enumerate() {
                 self.set(block, lane as usize, words.map(|w| w[j]));
             }
         }
         for &lane in rest {
-            self.set(block, lane as usize, self.rng.words(self.counters[lane as usize], block));
+            self.draw_one(block, lane);
         }
     }
 
-    /// Makes the lane's block from four random words.
+    /// Draws a block for one lane.
+    #[inline]
+    fn draw_one(&mut self, block: u16, lane: u32) {
+        let counter = self.counters[lane as usize];
+        let words = if self.low_discrepancy(block, lane) {
+            sobol::words(self.rng, counter, block)
+        } else {
+            self.rng.words(counter, block)
+        };
+        self.set(block, lane as usize, words);
+    }
+
+    /// Whether a block of a lane comes from the low-discrepancy sequence.
     #[inline(always)]
-    fn set(&mut self, block: u16, lane: usize, words: [u32; 4]) {
+    fn low_discrepancy(&self, block: u16, lane: u32) -> bool {
+        block < LOW_DISCREPANCY_BLOCKS && self.moves[lane as usize] == Move::Stratified
+    }
+
+    /// Makes the lane's block from four words that are uniform.
+    #[inline(always)]
+    fn set(&mut self, block: u16, lane: usize, words: Block) {
         let proposed = match self.moves[lane] {
             Move::Small(law) if block < self.current.used(lane) => law.step(self.current.block(block, lane), words),
-            Move::FreshAfterFirst if block == 0 => return,
+            Move::Stratified if block == 0 => within_pixel(self.counters[lane].ladder, self.film, words),
             _ => words,
         };
         self.points.set(block, lane, proposed);
@@ -84,5 +115,59 @@ impl Proposals<'_> {
     #[inline(always)]
     pub fn block(&self, block: u16, lane: usize) -> Block {
         self.points.block(block, lane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::PixelOrder;
+
+    const FILM: [u32; 2] = [5, 7];
+
+    /// Draws six blocks of the lanes that `moves` names; all lanes have counters of stratified points.
+    fn draw(moves: &[Move]) -> Points {
+        let counters: Vec<Counter> = PixelOrder::new(FILM).points_from(1000).take(moves.len()).collect();
+        let (current, mut points, mut live) = (Points::new(moves.len()), Points::new(moves.len()), Vec::new());
+        let mut proposals = Proposals {
+            rng: Rng::new(1),
+            current: &current,
+            points: &mut points,
+            counters: &counters,
+            moves,
+            film: FILM,
+        };
+        proposals.begin(&mut live);
+        (0..6).for_each(|block| proposals.draw(block, &live));
+        points
+    }
+
+    #[test]
+    fn a_stratified_point_is_the_same_in_any_company() {
+        let expected = draw(&[Move::Stratified; 40]);
+        for other in [Move::Rest, Move::Fresh] {
+            for every in 2..20 {
+                let moves: Vec<Move> = (0..40).map(|l| if l % every == 0 { other } else { Move::Stratified }).collect();
+                let points = draw(&moves);
+                for lane in (0..40).filter(|lane| moves[*lane] == Move::Stratified) {
+                    for block in 0..6 {
+                        assert_eq!(points.block(block, lane), expected.block(block, lane), "{lane}, {block}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stratified_points_lie_in_their_pixels_and_end_in_plain_words() {
+        let points = draw(&[Move::Stratified; 40]);
+        for (lane, counter) in PixelOrder::new(FILM).points_from(1000).take(40).enumerate() {
+            let [x, y, ..] = points.block(0, lane);
+            let [x, y] = [(x, FILM[0]), (y, FILM[1])].map(|(word, n)| ((u64::from(word) * u64::from(n)) >> 32) as u32);
+            assert_eq!(y * FILM[0] + x, counter.ladder);
+            for block in LOW_DISCREPANCY_BLOCKS..6 {
+                assert_eq!(points.block(block, lane), Rng::new(1).words(counter, block));
+            }
+        }
     }
 }

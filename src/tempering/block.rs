@@ -70,6 +70,7 @@ impl<W: Default + Send> Block<W> {
         offers: usize,
         lanes_a_part: usize,
         layers: usize,
+        film: [u32; 2],
     ) -> Block<W> {
         let chains = rungs - 1;
         let replicas = ladders * chains;
@@ -90,10 +91,12 @@ impl<W: Default + Send> Block<W> {
         for start in (0..lanes).step_by(lanes_a_part) {
             let range = start..(start + lanes_a_part).min(lanes);
             let own = replicas.clamp(range.start, range.end) - range.start;
+            let mut evaluator = Evaluator::new(rng, range.clone().map(|lane| block.counter(lane)).collect());
+            evaluator.film = film; // of the stratified points that chains start from
             block.parts.push(Part {
                 replicas: own,
                 walkers: Walkers::new(own),
-                evaluator: Evaluator::new(rng, range.clone().map(|lane| block.counter(lane)).collect()),
+                evaluator,
                 tally: Tally::new(rungs, layers),
                 refused: vec![0; own],
                 scale: vec![0; own],

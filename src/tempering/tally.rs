@@ -2,7 +2,7 @@
 //! nothing depends on how work was cut up.
 
 use super::{
-    Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
+    Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
     steps::{SCALES, StepCount},
 };
 use crate::{
@@ -26,6 +26,31 @@ pub struct Layers {
     pub rungs: Option<usize>,
     /// Number of layers.
     pub count: usize,
+}
+
+impl Layers {
+    /// The layers that those choices need, with room for the parts of `most_rungs`.
+    pub fn of(choices: &Choices, most_rungs: usize) -> Layers {
+        let mut count = 0;
+        let mut layer = |wanted: bool, layers: usize| {
+            wanted.then(|| {
+                count += layers;
+                count - layers
+            })
+        };
+        let pair = !matches!(choices.combine, Combine::Balance | Combine::Target | Combine::Uniform);
+        let balance = choices.combine == Combine::Balance || choices.layers;
+        let chains = most_rungs > 1;
+        let layers = Layers {
+            uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
+            hot: layer(balance, 1),
+            tempered: layer(balance && chains, 1),
+            target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
+            rungs: layer(choices.layers && chains, most_rungs.saturating_sub(1)),
+            count: 0,
+        };
+        Layers { count, ..layers }
+    }
 }
 
 /// The film that blocks record to, and its probes.

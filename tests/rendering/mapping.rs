@@ -13,20 +13,23 @@ use crate::support::{OWN, fixed_widths, load, own, repository};
 /// No multiple of any packet width.
 const LANES: usize = 61;
 const STEPS: u64 = 60;
+/// The film of stratified points, whose pixels are numbered as the lanes.
+const FILM: [u32; 2] = [8, 8];
 
 /// Steps large enough that paths change their length.
 fn law() -> StepLaw {
     StepLaw::new(1.0 / 1024.0, 1.0 / 8.0)
 }
 
-/// Fresh points at first, then small steps from the last lit point, fresh points, ones with a given film position
-/// and rest, in an order that differs from lane to lane.
+/// Fresh points at first, then small steps from the last lit point, fresh points, stratified ones and rest,
+/// in an order that differs from lane to lane: runs of stratified lanes fill whole chunks of lanes, or not.
 fn moves(step: u64) -> Vec<Move> {
     let of_lane = |lane: u64| match (step + lane) % 8 {
+        _ if step % 4 == 1 && lane % 32 < 20 => Move::Stratified,
         _ if step == 0 => Move::Fresh,
         0 => Move::Rest,
         1 => Move::Fresh,
-        2 => Move::FreshAfterFirst,
+        2 => Move::Stratified,
         _ => Move::Small(law()),
     };
     (0..LANES as u64).map(of_lane).collect()
@@ -34,15 +37,6 @@ fn moves(step: u64) -> Vec<Move> {
 
 fn counters(step: u64) -> Vec<Counter> {
     (0..LANES).map(|lane| Counter { ladder: lane as u32, replica: 3, step, purpose: Purpose::Primary }).collect()
-}
-
-/// Film positions given from outside, for [`Move::FreshAfterFirst`].
-fn place_first_blocks(points: &mut Points, moves: &[Move], step: u64) {
-    points.reserve(0);
-    for (lane, _) in moves.iter().enumerate().filter(|(_, m)| **m == Move::FreshAfterFirst) {
-        let word = (step as u32).wrapping_mul(0x9E37_79B9).wrapping_add((lane as u32).wrapping_mul(0x85EB_CA6B));
-        points.set(0, lane, [word, word.rotate_left(16), 0, 0]);
-    }
 }
 
 fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
@@ -54,7 +48,7 @@ fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) 
     let mapping = Mapping::with_kernel(scene, fixed_widths(width), kernel);
     let layout = Layout::new(&scene.features);
     let rng = Rng::new(7);
-    let mut evaluator = Evaluator::<Workspace>::new(rng, law(), counters(0));
+    let mut evaluator = Evaluator::<Workspace>::new(rng, counters(0));
     let mut current = Points::new(LANES);
     let mut all = Vec::new();
     let mut faults = 0;
@@ -62,15 +56,20 @@ fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) 
         let moves = moves(step);
         evaluator.counters = counters(step);
         evaluator.moves = moves.clone();
-        place_first_blocks(&mut evaluator.points, &moves, step);
+        evaluator.film = FILM;
         let before = evaluator.out.lanes.clone();
         evaluator.evaluate(&mapping, &current);
 
         let mut points = Points::new(LANES);
-        place_first_blocks(&mut points, &moves, step);
         let counters = counters(step);
-        let mut proposals =
-            Proposals { rng, current: &current, points: &mut points, counters: &counters, moves: &moves };
+        let mut proposals = Proposals {
+            rng,
+            current: &current,
+            points: &mut points,
+            counters: &counters,
+            moves: &moves,
+            film: FILM,
+        };
         let mut live = Vec::new();
         proposals.begin(&mut live);
         for lane in (0..LANES).filter(|lane| moves[*lane] == Move::Rest) {

@@ -2,7 +2,7 @@
 
 use super::{Learnt, Sampler};
 use crate::{
-    film::{Accumulator, Filter, Heuristic, Image, Plane, Splats},
+    film::{Heuristic, Image, Plane, Splats},
     tempering::{Combine, Histogram, Tally},
 };
 
@@ -56,7 +56,7 @@ struct Planes<'a, W> {
 
 impl<W: Default + Send> Planes<'_, W> {
     fn sums(&self, layer: Option<usize>) -> Option<Vec<[f64; 4]>> {
-        layer.map(|layer| layer_with(&self.sampler.screen.film, self.pending, layer))
+        layer.map(|layer| self.sampler.screen.film.layer_with(layer, self.pending))
     }
 
     fn pixels(&self) -> f64 {
@@ -135,7 +135,7 @@ impl<W: Default + Send> Planes<'_, W> {
     }
 
     fn pixel_means(&self) -> PixelMeans {
-        PixelMeans::new(self.pixels(), self.sampler.points, self.sampler.screen.filter)
+        PixelMeans::new(self.pixels(), self.sampler.points, self.sampler.screen.footprint.is_box())
     }
 }
 
@@ -152,26 +152,15 @@ struct PixelMeans {
 }
 
 impl PixelMeans {
-    fn new(pixels: f64, points: u64, filter: Filter) -> PixelMeans {
-        // 1 − (1 − 1/pixels)^points, for independent points; stratified ones miss fewer pixels once they have been
-        // through the film
-        let some = -libm::expm1(points as f64 * libm::log1p(-1.0 / pixels));
-        let missing = filter == Filter::Box && points > 0 && pixels > 1.0;
-        PixelMeans { scale: if missing { 1.0 / some } else { 1.0 } }
+    /// `stratified` and `offered` are the numbers of points of either kind; with a box filter a point is in one pixel.
+    fn new(pixels: f64, [stratified, offered]: [u64; 2], box_filter: bool) -> PixelMeans {
+        // (1 − s/P)⁺ (1 − 1/P)^o, the share of pixels that get none
+        let none = (1.0 - stratified as f64 / pixels).max(0.0) * libm::exp(offered as f64 * libm::log1p(-1.0 / pixels));
+        let some = if pixels > 1.0 { 1.0 - none } else { 1.0 };
+        PixelMeans { scale: if box_filter && some > 0.0 { 1.0 / some } else { 1.0 } }
     }
 
     fn of(&self, &[r, g, b, weight]: &[f64; 4]) -> [f64; 3] {
         if weight > 0.0 { [r, g, b].map(|v| v * self.scale / weight) } else { [0.0; 3] }
     }
-}
-
-/// Σ rgb and Σ weight of every pixel of a layer, with splats that are not on the film yet.
-pub fn layer_with(film: &Accumulator, pending: &Splats, layer: usize) -> Vec<[f64; 4]> {
-    let mut sums = film.layer(layer);
-    for splat in pending.layer(layer) {
-        let [r, g, b] = splat.rgb;
-        let sum = &mut sums[splat.pixel as usize];
-        sum.iter_mut().zip([r, g, b, splat.weight]).for_each(|(s, v)| *s += f64::from(v));
-    }
-    sums
 }

@@ -1,5 +1,7 @@
 //! What the statistics of all rungs say.
 
+use crate::tempering::{DensityOfStates, Estimate, Histogram, Ladder, Normalisers, stepping_stones, uniform_mean};
+
 /// What is known at the end of a round.
 pub struct Learnt {
     /// ln Z of every rung, and c.
@@ -13,7 +15,7 @@ pub struct Learnt {
 }
 
 impl Learnt {
-    fn of(ladder: &Ladder, groups: &[Vec<Histogram>]) -> Learnt {
+    pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>]) -> Learnt {
         let groups: Vec<&[Histogram]> = groups.iter().map(Vec::as_slice).collect();
         let normalisers = Normalisers::solve(ladder, &groups);
         Learnt {

@@ -6,45 +6,30 @@
 //! doubling length. Within a round nothing changes; between rounds normalisers, rungs, step sizes, the weights of the
 //! image and the share of uniform points are made from what was seen before, until they are frozen.
 
+mod development;
+mod learnt;
+mod reporting;
+mod rounds;
+
 use rayon::prelude::*;
 
+pub use development::Development;
+pub use learnt::Learnt;
+
 use super::{
-    Block, Canvas, Choices, Combine, DensityOfStates, Estimate, Histogram, Ladder, LadderChoice, Layers, Normalisers,
-    ProbeMap, Probes, Round, RungCounts, StepMix, Tally, Weights, independent::Independent, probes::RATIOS,
-    tuning::{Choice, Measured}, uniform_mean,
+    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, ProbeMap, Probes, Round, RoundReport,
+    StepMix, Tally, Weights, independent::Independent, steps::StepCount, tuning::Choice,
 };
 use crate::{
-    chain::{Plan, Start, Target, resample},
+    chain::{Plan, Start, Target},
     film::{Accumulator, Footprint},
     rng::Rng,
 };
 
 /// Uniform points before chains start; a sixteenth of the run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
-/// The part of a run of known length within which everything is learnt; what comes after is frozen.
-const LEARNING_PART: f64 = 0.25;
-/// Length of the rounds in which settings are learnt, from the first to the last: 2¹⁸ to 2²² evaluations, or 4 to 64 a
-/// pixel where that is more.
-const FIRST_ROUND: u64 = 1 << 18;
-const FIRST_ROUND_A_PIXEL: u64 = 4;
-const LEARNING_ROUNDS: u32 = 5;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
-/// Lanes that are evaluated together; a ladder longer than that is cut into parts.
-const LANES_A_PART: usize = 512;
-/// Rungs are placed anew where the rejections that the density of states predicts differ by more.
-const UNEQUAL_REJECTION: f64 = 0.05;
-/// Uniform points that a chain should take over a sweep, if offers are to be had: it then forgets its past as fast as
-/// it can make use of.
-const OFFERS_TAKEN: f64 = 0.5;
-/// What an evaluation costs beside its rays, in rays: random numbers, shading, recording (benches/mutations.rs: half of
-/// the time of paths with some eight rays is spent outside Embree).
-const COST_BESIDE_RAYS: f64 = 6.0;
-/// What a state counts for in the first round, before that is measured.
-const FIRST_RATIO: f64 = 0.25;
-/// Share of uniform points, at least, and at most where chains are asked for.
-const LEAST_UNIFORM: f64 = 0.1;
-const MOST_UNIFORM_WITH_CHAINS: f64 = 15.0 / 16.0;
 
 /// Replica exchange at work on one target.
 pub struct Sampler<W> {
@@ -64,27 +49,26 @@ pub struct Sampler<W> {
     choice: Choice,
     /// Rungs were moved for the next round.
     moved: bool,
-    round_rays: Rays,
+    /// Rays of the ladders in this round, offered points included.
+    ladder_rays: u64,
     /// The part of the film's weight that each pixel has got, in evaluations.
     effort: f64,
-    /// States of chains on each rung so far, pilot rounds included.
+    /// Correlation of chains as the image sees it, from the last round that was probed.
+    image_correlation: Option<f64>,
+    /// States of chains on each rung so far, of all ladders.
     states_a_rung: u64,
+    /// Uniform points so far: those that came in the order of pixels, and those offered to ladders.
+    points: [u64; 2],
+    /// Rays of a uniform point, as the first sweeps had them.
+    rays_a_point: f64,
+    sweeps: u64,
     evaluations: u64,
     wanted: Option<u64>,
     non_finite: u64,
     rays: u64,
-    latest: Option<Learnt>,
     reports: Vec<RoundReport>,
 }
 
-/// Rays of a round.
-#[derive(Clone, Copy, Debug, Default)]
-struct Rays {
-    /// Of points that were not offered, and how many these were.
-    uniform: [f64; 2],
-    /// Of ladders, offered points included.
-    ladders: f64,
-}
 
 /// The film and all that belongs to it.
 struct Screen {
@@ -152,7 +136,7 @@ impl<W: Default + Send> Sampler<W> {
             LadderChoice::Replicas(k) => *k as usize,
             LadderChoice::Betas(betas) => betas.len(),
         };
-        let layers = layers(&choices, most_rungs);
+        let layers = Layers::of(&choices, most_rungs);
         let map = ProbeMap::new(size);
         let learns = choices.combine == Combine::Balance && most_rungs > 1;
         let screen = Screen {
@@ -193,7 +177,11 @@ impl<W: Default + Send> Sampler<W> {
             ladders_a_block: 0,
             choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
             moved: false,
-            round_rays: Rays::default(),
+            ladder_rays: 0,
+            image_correlation: None,
+            points: [0; 2],
+            rays_a_point: 0.0,
+            sweeps: 0,
             reports: Vec::new(),
             effort: 0.0,
             states_a_rung: 0,
@@ -201,7 +189,6 @@ impl<W: Default + Send> Sampler<W> {
             wanted: evaluations,
             rays: 0,
             non_finite: 0,
-            latest: None,
         }
     }
 
@@ -246,7 +233,7 @@ impl<W: Default + Send> Sampler<W> {
                     block.advance(target, 1, &canvas, round);
                 }
                 let keep = |start: Start| {
-                    if keeps {
+                    if keeps && start.ln_g > f64::NEG_INFINITY {
                         starts.push(start);
                     }
                 };
@@ -262,10 +249,11 @@ impl<W: Default + Send> Sampler<W> {
             let [ladders, more] = portion.ladders.as_mut().map_or([0; 2], Block::take_rays_and_faults);
             self.rays += uniform + ladders;
             self.non_finite += faults + more;
-            self.round_rays.uniform[0] += uniform as f64;
-            self.round_rays.ladders += ladders as f64;
+            self.ladder_rays += ladders;
         }
-        self.round_rays.uniform[1] += (sweeps as usize * self.portions.len() * self.schedule.points) as f64;
+        self.points[0] += sweeps * (self.portions.len() * self.schedule.points) as u64;
+        self.points[1] += sweeps * self.ladders() * self.offers as u64;
+        self.sweeps += sweeps;
         let evaluations = sweeps * self.a_sweep();
         self.evaluations += evaluations;
         self.effort += evaluations as f64;
@@ -275,7 +263,48 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Ladders at work.
     fn ladders(&self) -> u64 {
-        self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.ladders_a_block() as u64
+        self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.ladders_a_block as u64
+    }
+
+    /// Evaluations in all, where they are limited: whole sweeps, so a little more than was asked for.
+    pub fn evaluations_wanted(&self) -> Option<u64> {
+        self.sweeps_left().map(|sweeps| self.evaluations + sweeps * self.a_sweep())
+    }
+
+    /// Rays traced so far.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Contributions so far that were not finite and were taken as zero.
+    pub fn non_finite(&self) -> u64 {
+        self.non_finite
+    }
+
+    /// The film.
+    pub fn film(&self) -> &Accumulator {
+        &self.screen.film
+    }
+
+    /// The ladder at work; of one rung as long as there is none.
+    pub fn ladder(&self) -> &Ladder {
+        &self.round.ladder
+    }
+
+    /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round.
+    pub fn acceptances(&self) -> (Vec<f64>, Vec<f64>) {
+        let counts = self.counts_by_rung();
+        let steps = counts[1..].iter().map(|counts| {
+            let mut all = StepCount::default();
+            counts.steps.iter().for_each(|count| all += *count);
+            all.acceptance()
+        });
+        (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
+    }
+
+    /// Reports of the rounds that ended since this was last asked for.
+    pub fn take_reports(&mut self) -> Vec<RoundReport> {
+        std::mem::take(&mut self.reports)
     }
 }
 
@@ -289,29 +318,6 @@ impl Screen {
             probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
         }
     }
-}
-
-/// The layers that those choices need, with room for the parts of `most_rungs`.
-fn layers(choices: &Choices, most_rungs: usize) -> Layers {
-    let mut count = 0;
-    let mut layer = |wanted: bool, layers: usize| {
-        wanted.then(|| {
-            count += layers;
-            count - layers
-        })
-    };
-    let pair = !matches!(choices.combine, Combine::Balance | Combine::Target | Combine::Uniform);
-    let balance = choices.combine == Combine::Balance || choices.layers;
-    let chains = most_rungs > 1;
-    let layers = Layers {
-        uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
-        hot: layer(balance, 1),
-        tempered: layer(balance && chains, 1),
-        target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
-        rungs: layer(choices.layers && chains, most_rungs.saturating_sub(1)),
-        count: 0,
-    };
-    Layers { count, ..layers }
 }
 
 /// `length`, or that part of the run where it is less.

@@ -1,9 +1,44 @@
-//! Ends of rounds.
+//! Ends of rounds: what was learnt, and what follows from it.
 
-/// Ends of rounds: what was learnt, and what follows from it.
+use rayon::prelude::*;
+
+use super::{Learnt, MOST_AUTOMATIC, Portion, Sampler, at_most};
+use crate::{
+    chain::{Start, Target, resample},
+    tempering::{
+        Block, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Weights,
+        placement::rungs,
+        probes::RATIOS,
+        tuning::{Choice, Measured},
+    },
+};
+
+/// The part of a run of known length within which everything is learnt; what comes after is frozen.
+const LEARNING_PART: f64 = 0.25;
+/// Length of the rounds in which settings are learnt, from the first to the last: 2¹⁸ to 2²² evaluations, or 4 to 64 a
+/// pixel where that is more.
+const FIRST_ROUND: u64 = 1 << 18;
+const FIRST_ROUND_A_PIXEL: u64 = 4;
+const LEARNING_ROUNDS: u32 = 5;
+/// Lanes that are evaluated together; a ladder longer than that is cut into parts.
+const LANES_A_PART: usize = 512;
+/// Rungs are placed anew where the rejections that the density of states predicts differ by more.
+const UNEQUAL_REJECTION: f64 = 0.05;
+/// Uniform points that a chain should take over a sweep, if offers are to be had: it then forgets its past as fast as
+/// it can make use of.
+const OFFERS_TAKEN: f64 = 0.5;
+/// What an evaluation costs beside its rays, in rays: random numbers, shading, recording (benches/mutations.rs: half of
+/// the time of paths with some eight rays is spent outside Embree).
+const COST_BESIDE_RAYS: f64 = 6.0;
+/// What a state counts for in the first round, before that is measured.
+const FIRST_RATIO: f64 = 0.25;
+/// Share of uniform points, at least, and at most where chains are asked for.
+const LEAST_UNIFORM: f64 = 0.1;
+const MOST_UNIFORM_WITH_CHAINS: f64 = 15.0 / 16.0;
+
 impl<W: Default + Send> Sampler<W> {
     /// Ends the round at work and begins the next.
-    fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
+    pub(super) fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
         self.flush();
         let learnt = self.learn();
         let mut report = self.report(&learnt);
@@ -21,7 +56,6 @@ impl<W: Default + Send> Sampler<W> {
         report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.effort);
         self.reports.push(report);
         self.begin_round(&learnt);
-        self.latest = Some(learnt);
     }
 
     /// Records what states have gathered; the round's settings still hold.
@@ -42,7 +76,7 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     /// A portion's histograms by rung.
-    fn group(&self, portion: &Portion<W>) -> Vec<Histogram> {
+    pub(super) fn group(&self, portion: &Portion<W>) -> Vec<Histogram> {
         let mut group = vec![Histogram::default(); self.round.ladder.rungs()];
         group[0].merge(&portion.tally.histograms[0]);
         group.iter_mut().zip(&portion.past).for_each(|(sum, past)| sum.merge(past));
@@ -74,15 +108,16 @@ impl<W: Default + Send> Sampler<W> {
             .enumerate()
             .map(|(rung, &beta)| resample(&samples, beta, all, self.rng, rung as u32))
             .collect();
-        let (rng, layers, offers) = (self.rng, self.screen.layers.count, self.offers);
+        let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.offers, self.screen.size);
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
             let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
-            let mut block = Block::new(rng, (first as u32, ladders), chains + 1, offers, LANES_A_PART, layers);
+            let mut block = Block::new(rng, (first as u32, ladders), chains + 1, offers, LANES_A_PART, layers, size);
             block.start(target, &starts);
             portion.ladders = Some(block);
         });
         self.ladders_a_block = ladders;
+        self.rays_a_point = self.rays as f64 / self.evaluations as f64;
         self.round.mixes = vec![StepMix::kelemen(); chains + 1];
         self.choice = Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
         let how = match self.choices.ladder {
@@ -176,11 +211,9 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Cost of a uniform point and of a step of a chain, in rays.
     fn costs(&self, states: f64) -> [f64; 2] {
-        let Rays { uniform: [rays, points], ladders } = self.round_rays;
-        let a_point = rays / points.max(1.0);
         let offered = (self.schedule.done * self.ladders()) as f64 * self.offers as f64;
-        let a_state = (ladders - offered * a_point).max(0.0) / states.max(1.0);
-        [a_point + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
+        let a_state = (self.ladder_rays as f64 - offered * self.rays_a_point).max(0.0) / states.max(1.0);
+        [self.rays_a_point + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
     }
 
     /// Places rungs at equal rejection, unless they are near enough.
@@ -244,7 +277,7 @@ impl<W: Default + Send> Sampler<W> {
         if self.screen.probes.is_some() {
             self.screen.probes = Some(Probes::new(&self.screen.map, self.screen.unit));
         }
-        self.round_rays = Rays::default();
+        self.ladder_rays = 0;
         self.schedule.round += 1;
         let evaluations = match (self.schedule.round, self.schedule.frozen) {
             (1, _) => {
@@ -263,13 +296,13 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     /// Uniform points of a block in a sweep, offered or not.
-    fn points_a_block(&self) -> usize {
+    pub(super) fn points_a_block(&self) -> usize {
         let offered = if self.ladders() > 0 { self.offers * self.ladders_a_block } else { 0 };
         offered + self.schedule.points
     }
 
     /// Counts of the round, by rung.
-    fn counts_by_rung(&self) -> Vec<RungCounts> {
+    pub(super) fn counts_by_rung(&self) -> Vec<RungCounts> {
         let mut sums = vec![RungCounts::default(); self.round.ladder.rungs()];
         for portion in &self.portions {
             sums[0].add(&portion.tally.counts[0]);
