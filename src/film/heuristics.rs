@@ -185,7 +185,7 @@ mod tests {
             let combined = heuristic.combine(&a, &b);
             let pairs = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
             for (got, (a, b)) in combined.pixels.as_flattened().iter().zip(pairs) {
-                assert!((a.min(*b)..=a.max(*b)).contains(&got), "{heuristic:?}: {got} of {a} and {b}");
+                assert!((a.min(*b)..=a.max(*b)).contains(got), "{heuristic:?}: {got} of {a} and {b}");
             }
         }
     }
@@ -244,10 +244,10 @@ mod tests {
     fn channels_and_corners_are_their_own_neighbourhoods() {
         let image = Image::new(2, 1, vec![[1.0, 10.0, 0.0], [3.0, 30.0, 0.0]]);
         for (channel, values) in [(0, [1.0, 3.0]), (1, [10.0, 30.0]), (2, [0.0, 0.0])] {
-            for pixel in 0..2 {
+            for (pixel, value) in values.into_iter().enumerate() {
                 // of every row two columns are the border's pixel and one is the other's
                 let around = Neighbourhood::new([&image, &image], pixel, channel);
-                assert_eq!((around.median, around.median_deviation), (values[pixel], 0.0));
+                assert_eq!((around.median, around.median_deviation), (value, 0.0));
             }
         }
     }

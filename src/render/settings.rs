@@ -66,6 +66,17 @@ impl Normalisation {
 }
 
 /// What may be chosen about `mlt`.
+///
+/// relMSE at 64 mutations per pixel, median of three seeds, as two-pass / pooled / pooled with Kelemen's weights:
+///
+/// | p | `cornell-box` | `caustic` | `lattice` |
+/// |---|---|---|---|
+/// | 0.1 | 0.0168 / 0.0162 / 0.0140 | 1.21 / 1.24 / 1.23 | 1.31 / 1.28 / 1.28 |
+/// | 0.3 | 0.0168 / 0.0165 / 0.0121 | 1.51 / 1.53 / 1.52 | 1.48 / 1.49 / 1.48 |
+/// | 0.5 | 0.0185 / 0.0185 / 0.0120 | 1.80 / 1.84 / 1.84 | 1.95 / 1.88 / 1.87 |
+///
+/// Pooling takes out the error of brightness, up to 6 % here, which relMSE hardly minds beside noise of this size.
+/// The weights change only what samples with g/c up to about p add: much of the box, little of the others' noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MltSettings {
     /// Probability of a large step, in (0, 1).
