@@ -16,8 +16,8 @@
 //! memberships p̄. From ∂p/∂v = p (β − β̄) and Cauchy–Schwarz, Σ_{b∈c} h_b (y·(p(b) − p̄))² ≤ Δ² Σ_{b∈c} h_b Var_p y where the
 //! bins' spread in t(v) = ∫ sd_p(β) dv is Δ at most (sd_p(β): of the inverse temperature of a state seen at v). So
 //! H ⪯ H̃ ⪯ (1 + Δ²) H: steps never overshoot where the likelihood is quadratic, and each leaves Δ² = 1.6 % of the
-//! error. There are some ten merged bins for every unit of the communication barrier, whatever the number of rungs,
-//! and with fewer of them than rungs the Woodbury identity makes their number the size of the linear system.
+//! error. The number of merged bins follows from the range of t, hardly from that of rungs; where they are fewer than rungs, the
+//! Woodbury identity makes their number the size of the linear system.
 
 use super::{Histogram, stepping::Stone};
 
@@ -226,7 +226,7 @@ impl Likelihood {
     ///
     /// What group j adds to the gradient moves x by H⁻¹ times that, and its weights move the n_l that x absorbs:
     /// i_j = y · (Σ_{b∈j} h_b p(b) − n_j) + n_jK/n_K − n_j1/n_1 with y = H⁻¹ e_K, for which H̃ does
-    /// (it makes i_j too small by 1.6 % at most). NaN where there is no curvature.
+    /// (it changes y by some 1.6 % at most). NaN where there is no curvature.
     pub fn influences<'g>(
         &self,
         maximum: &Maximum,
