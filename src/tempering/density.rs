@@ -112,7 +112,7 @@ impl DensityOfStates {
     }
 
     /// Predicted round trips per sweep of each replica's position on the ladder, 1/(2 + 2 Σ r/(1 − r)), when neighbours
-    /// swap by even–odd parity and every sweep forgets the state before (Syed et al. 2021, Theorem 1); an upper bound
+    /// swap by even–odd parity and every sweep forgets the state before (Syed et al. 2021); an upper bound
     /// in practice. Light is taken for granted as everywhere here; 0 where a pair never swaps.
     pub fn round_trip_rate(&self, betas: &[f64]) -> f64 {
         let odds: f64 = self.acceptances(betas).iter().map(|accepted| 1.0 / accepted - 1.0).sum();

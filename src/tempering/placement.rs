@@ -6,10 +6,10 @@ impl DensityOfStates {
     /// A ladder of `rungs` inverse temperatures with equal predicted rejections between neighbours; the first pair's,
     /// with β = 0, is that of lit points (otherwise darkness would drive β₂ to 0).
     ///
-    /// First Λ(β) is cut into equal parts (Syed et al. 2021, Algorithm 3), which is right for many rungs. Then the rungs
+    /// First Λ(β) is cut into equal parts (Syed et al. 2021), which is right for many rungs. Then the rungs
     /// move until the pairs' *lengths* √(−ln(1 − r²)) are equal, and with them r: along a ladder of Gaussian ln g that
-    /// length is additive to a few per cent however far rungs are apart (r is erf of half the distance), and it is r
-    /// where r is small. Equal steps where there is no barrier or nothing is known.
+    /// length is within 12 % of additive however far rungs are apart (r is erf of half the distance), and it is r where
+    /// r is small. Equal steps where there is no barrier or nothing is known.
     ///
     /// # Panics
     /// If `rungs` is 0 or more than [`Ladder::LONGEST`].

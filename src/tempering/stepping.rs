@@ -9,8 +9,8 @@ use super::{Estimate, Histogram, estimate::jackknife};
 /// and the reverse, 1/E_{k+1}[g^{−(β_{k+1} − β_k)}], on the darkest few, often without a variance. We take
 /// Bennett's acceptance ratio (1976), which uses both rungs and of all such estimates has the least variance for
 /// independent states; where rungs are close it is the mean of the two in logarithms. (Root mean square error of ln c,
-/// exponential target with s = 8, 1,600 states a rung: K = 2 0.070 against 0.107 for that mean, K = 5 0.052 against
-/// 0.053.) Consistent; bias O(1/N).
+/// g = e^{8x}, 1,600 independent states a rung, 400 runs, as hotter / reverse / mean of both / Bennett: K = 2 0.045,
+/// 0.166, 0.084, 0.033; K = 5 0.0204, 0.0250, 0.0202, 0.0197.) Consistent; bias O(1/N).
 ///
 /// The standard error is a jackknife over the groups, to first order. Rungs without states are stepped over; without a
 /// state on the target rung there is no estimate, nor without a lit uniform point: [`Estimate::ZERO`].
@@ -81,12 +81,14 @@ impl Stone {
             let (excess, slope) = stone.excess(bins.iter().copied());
             stone.slope = slope;
             *(if excess > 0.0 { &mut low } else { &mut high }) = stone.ln_ratio;
-            let step = excess / slope;
-            if step.abs() < 1e-11 * stone.ln_ratio.abs().max(1.0) {
+            let newton = stone.ln_ratio + excess / slope;
+            let is_inside = low <= newton && newton <= high;
+            let before = stone.ln_ratio;
+            stone.ln_ratio = if is_inside { newton } else { 0.5 * (low + high) };
+            // steps square: the next would be of 10⁻¹², and below rounding where the ratio is large
+            if (stone.ln_ratio - before).abs() < 1e-6 {
                 break;
             }
-            let newton = stone.ln_ratio + step;
-            stone.ln_ratio = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
         }
         stone
     }
