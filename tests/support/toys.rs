@@ -198,8 +198,8 @@ pub fn islands() -> Toy {
         .with(1.0, &[0.85, 0.6], &[0.02, 0.022])
 }
 
-/// Caustics: eight peaks that rise about as r^−2.2 from r = 0.05 down to 0.05/3^i, i from 0 to 4, made of Gaussians of as
-/// many widths. c = 494, p_s = 1, M = 1.5·10⁴: RMSE/c 1.4.
+/// Caustics: eight peaks that rise about as r^−2.4 from r = 0.03 down to 0.03/3^i, i from 0 to 4, made of Gaussians of as
+/// many widths. c = 1066, p_s = 1, M = 1.6·10⁴: RMSE/c 1.4.
 pub fn peaks() -> Toy {
     let centres =
         [[0.11, 0.62], [0.23, 0.21], [0.34, 0.83], [0.46, 0.37], [0.58, 0.71], [0.69, 0.12], [0.81, 0.55], [0.92, 0.9]];
@@ -207,8 +207,8 @@ pub fn peaks() -> Toy {
     for (i, centre) in centres.iter().enumerate() {
         let brightness = 0.5 + (5 * i % 8) as f32 / 8.0;
         for level in 0..=i % 5 {
-            let width = 0.05 / 3f32.powi(level as i32);
-            toy = toy.with(brightness * width.powf(-2.2), centre, &[width; 2]);
+            let width = 0.03 / 3f32.powi(level as i32);
+            toy = toy.with(brightness * width.powf(-2.4), centre, &[width; 2]);
         }
     }
     toy

@@ -1,0 +1,126 @@
+//! The same bits, however work is cut up.
+
+use rayon::ThreadPoolBuilder;
+use relt::{
+    film::{Accumulator, Filter, Footprint, Image},
+    rng::Rng,
+    tempering::{Block, Canvas, Choices, Combine, Histogram, Ladder, Layers, Round, RungCounts, StepMix, Weights},
+};
+
+use crate::{
+    support::{exact_draws, replicas, sampler, two_peaks},
+    toys::Toy,
+};
+
+/// All that a run tells, as bits.
+fn bits(image: &Image, ln_z: &[f64], evaluations: u64) -> (Vec<u32>, Vec<u64>, u64) {
+    let values = image.pixels.iter().flatten().map(|v| v.to_bits()).collect();
+    (values, ln_z.iter().map(|v| v.to_bits()).collect(), evaluations)
+}
+
+/// A run of which `advance` is called with those numbers of sweeps in turn, on `threads` threads.
+fn run(choices: &Choices, threads: usize, slices: &[u64]) -> (Vec<u32>, Vec<u64>, u64) {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| {
+        let toy = two_peaks();
+        let mut sampler = sampler::<Toy>(choices.clone(), 16, 1 << 15, 7);
+        for slice in slices.iter().cycle() {
+            sampler.advance(&toy, *slice);
+            if sampler.sweeps_left() == Some(0) {
+                break;
+            }
+        }
+        let development = sampler.develop();
+        bits(&development.image, &development.learnt.normalisers.ln_z, sampler.evaluations())
+    })
+}
+
+#[test]
+fn threads_and_slices_do_not_change_a_bit() {
+    for choices in [
+        Choices::default(),
+        replicas(1, Combine::Balance),
+        replicas(3, Combine::Balance),
+        replicas(40, Combine::Balance),
+        replicas(3, Combine::Power),
+    ] {
+        let whole = run(&choices, 1, &[u64::MAX]);
+        for (threads, slices) in [(2, &[u64::MAX][..]), (1, &[1]), (2, &[1, 7, 2, 64]), (3, &[5, 1000])] {
+            assert!(run(&choices, threads, slices) == whole, "{choices:?}, {threads} threads, slices {slices:?}");
+        }
+    }
+}
+
+#[test]
+fn looking_at_the_picture_changes_nothing() {
+    let toy = two_peaks();
+    let [looked, not] = [true, false].map(|looks| {
+        let mut sampler = sampler::<Toy>(replicas(3, Combine::Balance), 16, 1 << 14, 7);
+        while sampler.sweeps_left() != Some(0) {
+            sampler.advance(&toy, 5);
+            if looks {
+                let [first, second] = [(); 2].map(|()| sampler.develop());
+                let [first, second] = [first, second].map(|d| bits(&d.image, &d.learnt.normalisers.ln_z, 0));
+                assert!(first == second);
+            }
+        }
+        let development = sampler.develop();
+        bits(&development.image, &development.learnt.normalisers.ln_z, sampler.evaluations())
+    });
+    assert!(looked == not);
+}
+
+/// What a block of ladders records in 40 sweeps in parts of `lanes_a_part`: film, histograms, counts, round trips.
+fn block(lanes_a_part: usize, threads: usize) -> (Vec<[f64; 4]>, Vec<Histogram>, Vec<RungCounts>, [u64; 2]) {
+    const LADDERS: usize = 5;
+    let (toy, rng) = (two_peaks(), Rng::new(3));
+    let ladder = Ladder::new(vec![0.0, 0.1, 0.3, 0.6, 1.0]);
+    let choices = replicas(5, Combine::Balance);
+    let layers = Layers::of(&choices, ladder.rungs());
+    let film = Accumulator::new(16, 1, layers.count, 1.0);
+    let footprint = Footprint::new(Filter::Box, 16, 1);
+    let canvas = Canvas { footprint: &footprint, size: [16, 1], film: &film, layers, probes: None };
+    let round = Round {
+        weights: Weights::new(&ladder, &[0.0, -0.5, -1.2, -2.0, -3.0], 0.25, -3.0),
+        mixes: vec![StepMix::kelemen(); ladder.rungs()],
+        effort: [1.0, 1.0],
+        half: 20,
+        ladder,
+    };
+    let starts: Vec<_> =
+        (1..5).map(|k| exact_draws(&toy, round.ladder.betas()[k], 4.1, LADDERS, rng, k as u32)).collect();
+    let starts: Vec<_> = starts.iter().map(Vec::as_slice).collect();
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| {
+        let mut block = Block::new(rng, (0, LADDERS), 5, 2, lanes_a_part, layers.count, [16, 1]);
+        block.start(&toy, &starts);
+        block.advance(&toy, 20, &canvas, &round);
+        block.set_offers(rng, 3);
+        block.advance(&toy, 20, &canvas, &round);
+        block.flush(&canvas, &round);
+        block.deposit(&canvas, 0);
+        let mut histograms = vec![Histogram::default(); 5];
+        block.add_histograms(&mut histograms);
+        let mut counts = vec![RungCounts::default(); 5];
+        block.add_counts(&mut counts);
+        // sums of floats over parts, for reports only, depend on how parts are cut
+        counts.iter_mut().for_each(|c| (c.halves, c.luminance) = ([[0.0; 2]; 2], 0.0));
+        let film = (0..layers.count).flat_map(|layer| film.layer(layer)).collect();
+        (film, histograms, counts, [block.trips().round_trips, block.trips().restarts])
+    })
+}
+
+#[test]
+fn parts_of_a_block_do_not_change_a_bit() {
+    let whole = block(512, 1);
+    assert!(whole.3[1] > 0, "some state climbs the ladder");
+    for lanes_a_part in [1, 3, 4, 7, 16, 29, 30] {
+        for threads in [1, 2] {
+            let parts = block(lanes_a_part, threads);
+            assert!(parts.0 == whole.0, "film, {lanes_a_part} lanes a part, {threads} threads");
+            assert!(parts.1 == whole.1, "histograms, {lanes_a_part} lanes a part, {threads} threads");
+            assert_eq!(parts.2, whole.2, "counts, {lanes_a_part} lanes a part, {threads} threads");
+            assert_eq!(parts.3, whole.3, "trips, {lanes_a_part} lanes a part, {threads} threads");
+        }
+    }
+}
