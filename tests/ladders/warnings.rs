@@ -32,7 +32,7 @@ fn no_ladder_misses_needles_in_silence() {
     const RUNS: u64 = 48;
     let toy = golf();
     let most = Binomial::new(0.03, RUNS).expect("a probability").inverse_cdf(1.0 - 1e-3);
-    for choices in [2, 4, 8].map(|k| replicas(k, Combine::Balance)).into_iter().chain([Choices::default()]) {
+    for choices in [2, 4].map(|k| replicas(k, Combine::Balance)).into_iter().chain([Choices::default()]) {
         let runs = runs(&toy, &choices, 16, 1 << 17, RUNS);
         let c = |run: &Run| run.learnt.normalisers.target.value;
         let image = |run: &Run| mean(run.image.iter().copied());
