@@ -12,7 +12,7 @@ pub use crate::tempering::{Choices, Combine, LadderChoice};
 /// How the image is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Method {
-    /// Independent samples and nothing else.
+    /// Stratified samples and nothing else.
     #[serde(rename = "path")]
     Path,
     /// Primary-sample Metropolis light transport (Kelemen et al. 2002), normalised by independent samples beforehand.

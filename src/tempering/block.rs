@@ -279,9 +279,9 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
-    /// Puts what was splatted onto the film.
-    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
-        self.parts.iter_mut().for_each(|part| part.tally.deposit(canvas, block));
+    /// Puts what was splatted onto the film, and into that half of the probes.
+    pub fn deposit(&mut self, canvas: &Canvas, half: usize) {
+        self.parts.iter_mut().for_each(|part| part.tally.deposit(canvas, half));
     }
 
     /// Adds the histograms to those of the group, by rung.
@@ -380,7 +380,7 @@ impl<W: Default> Part<W> {
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
         for point in &evaluator.out.lanes[self.replicas..] {
-            tally.uniform_point(canvas, round, point);
+            tally.uniform_point(canvas, round, point, false);
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Probes: a part of the pixels where the image is made several times over, to learn which weights serve it best.
 //!
-//! Independent halves of the ladders fill separate films, so the difference of the halves shows the error of the image
-//! as it is, correlations of chains and evenness of pixels included.
+//! Separate halves of the samples fill separate films, so the difference of the halves shows the error of the image as it
+//! is, correlations of chains and evenness of points included. Ladders are halved by blocks, stratified points by time:
+//! halves of a sequence of low discrepancy that follow one another are as even as the whole.
 
 use crate::film::{Accumulator, Splat, Splats};
 
@@ -83,9 +84,9 @@ impl Probes {
         }
     }
 
-    /// Adds the splats of block number `block`.
-    pub fn deposit(&self, block: usize, splats: &mut Splats) {
-        self.halves[block % 2].deposit(splats);
+    /// Adds splats to a half.
+    pub fn deposit(&self, half: usize, splats: &mut Splats) {
+        self.halves[half].deposit(splats);
     }
 
     /// Σ over uniform points, Σ over states, and number of uniform points, of every probe in both halves.

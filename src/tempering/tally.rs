@@ -1,6 +1,8 @@
 //! What one thread records while it works: statistics, splats, probes. Sums are of integers or kept in lists, so
 //! nothing depends on how work was cut up.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use super::{
     Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
     steps::{SCALES, StepCount},
@@ -65,6 +67,35 @@ pub struct Canvas<'a> {
     pub layers: Layers,
     /// Probes, while there is something to learn.
     pub probes: Option<(&'a ProbeMap, &'a Probes)>,
+    /// Where stratified points are counted.
+    pub groups: &'a PointGroups,
+}
+
+/// ln g of stratified points in groups that may be taken as independent. Histograms are exact, so it does not matter who
+/// adds to them when.
+pub struct PointGroups(Vec<Mutex<Histogram>>);
+
+impl PointGroups {
+    /// So many groups, all empty.
+    pub fn new(groups: usize) -> PointGroups {
+        PointGroups((0..groups).map(|_| Mutex::default()).collect())
+    }
+
+    /// Adds to a group what a histogram has, and empties that.
+    pub fn take(&self, group: usize, from: &mut Histogram) {
+        self.locked(group).merge(from);
+        *from = Histogram::default();
+    }
+
+    /// Adds a group's points to `sum`.
+    pub fn add_to(&self, group: usize, sum: &mut Histogram) {
+        sum.merge(&self.locked(group));
+    }
+
+    /// The group, even if another thread panicked with it in hand.
+    fn locked(&self, group: usize) -> MutexGuard<'_, Histogram> {
+        self.0[group].lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Canvas<'_> {
@@ -145,9 +176,10 @@ impl Tally {
         }
     }
 
-    /// Records an independent sample; the film counts dark ones too.
+    /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind: offered
+    /// ones are noisier.
     #[inline(always)]
-    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution) {
+    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution, stratified: bool) {
         self.histograms[0].add(point.ln_g, 1.0);
         let mixture = if point.is_dark() { 0.0 } else { round.weights.mixture(point.ln_g) };
         let size = canvas.size.map(|n| n as f32);
@@ -161,7 +193,7 @@ impl Tally {
             recorder.splat(layer, point, share, effort);
             self.counts[0].luminance += share * point.g();
         }
-        if let Some(probe) = canvas.probe(point) {
+        if let Some(probe) = canvas.probe(point).filter(|_| stratified) {
             let g = point.g();
             Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
         }
@@ -191,11 +223,11 @@ impl Tally {
         }
     }
 
-    /// Puts what was splatted onto the film; `block` is the number of the block that it came from.
-    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
+    /// Puts what was splatted onto the film, and into that half of the probes.
+    pub fn deposit(&mut self, canvas: &Canvas, half: usize) {
         canvas.film.deposit(&mut self.splats);
         match canvas.probes {
-            Some((_, probes)) => probes.deposit(block, &mut self.probes),
+            Some((_, probes)) => probes.deposit(half, &mut self.probes),
             None => self.probes.clear(),
         }
     }

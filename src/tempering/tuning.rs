@@ -20,12 +20,10 @@ pub struct Measured<'a> {
     pub probes: Vec<Vec<[[f64; 3]; 2]>>,
     /// Number of pixels of the film.
     pub pixels: f64,
-    /// Uniform points of the round, and chain states.
-    pub points: f64,
-    /// See `points`.
+    /// States of chains in the round, all tempered rungs.
     pub states: f64,
     /// What a half's Σ over states is multiplied by to be an image: pixels · Ẑ_K/unit over its samples a rung.
-    pub tempered_scale: [f64; 2],
+    pub tempered_scale: f64,
     /// (standard error/value)² of Ẑ_K.
     pub normaliser_variance: f64,
     /// c, the mean of the image.
@@ -54,23 +52,24 @@ const FLOOR: f64 = 0.5;
 impl Measured<'_> {
     /// The best choice; path tracing where nothing was seen or nothing is better.
     pub fn choose(&self) -> Choice {
-        let path = self.variances(0)[0] * self.cost[0];
-        let mut best = Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 };
-        let path_allowed = *self.shares.end() >= 1.0;
+        let importances = self.importances();
+        let [cost_u, cost_t] = self.cost;
+        let path = self.variances(0, &importances)[0] * cost_u;
+        let most = *self.shares.end();
         if path == 0.0 {
-            return Choice { ratio: RATIOS[RATIOS.len() - 2], share: self.shares.end().min(0.5), relative_error: 1.0 };
+            // no noise at all, as of a constant: nothing to choose by
+            return Choice { ratio: RATIOS[RATIOS.len() - 2], share: most.min(0.5), relative_error: 1.0 };
         }
-        if !path_allowed {
-            best.relative_error = f64::INFINITY;
-        }
+        let error = if most >= 1.0 { 1.0 } else { f64::INFINITY };
+        let mut best = Choice { ratio: 0.0, share: 1.0, relative_error: error };
         for (i, ratio) in RATIOS.into_iter().enumerate().skip(1) {
-            let [u, t] = self.variances(i);
-            let [cost_u, cost_t] = self.cost;
+            let [u, t] = self.variances(i, &importances);
             let odds = ((u * cost_t) / (t * cost_u)).sqrt();
-            // all the variance on one side, as for a constant, gives no odds
-            let share = if odds.is_finite() { odds / (1.0 + odds) } else { *self.shares.end() };
-            let share = share.clamp(*self.shares.start(), self.shares.end().min(MOST_WITH_CHAINS));
+            // all the variance on one side gives no odds
+            let share = if odds.is_finite() { odds / (1.0 + odds) } else { most };
+            let share = share.clamp(*self.shares.start(), most.min(MOST_WITH_CHAINS));
             let error = (u / share + t / (1.0 - share)) * (share * cost_u + (1.0 - share) * cost_t) / path;
+            if std::env::var("DBG").is_ok() { eprintln!("rho {ratio:.5} u {:.3} t {:.3} f {share:.2} E {error:.3}", u*cost_u/path, t*cost_t/path); }
             if error < best.relative_error {
                 best = Choice { ratio, share, relative_error: error };
             }
@@ -78,36 +77,54 @@ impl Measured<'_> {
         best
     }
 
+    /// How much the variance of each probe counts.
+    ///
+    /// The luminance is that of the most evenly weighed image, whose samples are all bounded, and its median over
+    /// neighbours: were a probe's own value to count, a sample that is much too bright would excuse itself.
+    fn importances(&self) -> Vec<f64> {
+        // not known, NaN, where no uniform point fell
+        let luminance = |[a, b]: &[[f64; 3]; 2]| (a[0] + b[0]) / (a[2] + b[2]) + 0.5 * (a[1] + b[1]) * self.tempered_scale;
+        let luminances: Vec<f64> = self.probes[EVEN].iter().map(luminance).collect();
+        let reach = NEIGHBOURS / 2;
+        (0..luminances.len())
+            .map(|i| {
+                let near = &luminances[i.saturating_sub(reach)..(i + reach + 1).min(luminances.len())];
+                let mut near: Vec<f64> = near.iter().copied().filter(|l| !l.is_nan()).collect();
+                near.sort_by(f64::total_cmp);
+                let median = near.get(near.len() / 2).copied().unwrap_or(self.mean);
+                1.0 / (median * median + (FLOOR * self.mean).powi(2))
+            })
+            .collect()
+    }
+
+    /// Images of the two halves of a probe: from uniform points, and from states.
+    fn parts(&self, halves: &[[f64; 3]; 2]) -> [[f64; 2]; 2] {
+        [halves.map(|[uniform, _, points]| uniform / points), halves.map(|[_, states, _]| states * self.tempered_scale)]
+    }
+
     /// U and T with the ratio number `i`.
-    fn variances(&self, i: usize) -> [f64; 2] {
-        let [mut u, mut t] = [0.0; 2];
-        let mut both = 0.0;
-        for halves in &self.probes[i] {
-            let [hot, tempered] = [0, 1].map(|part: usize| {
-                [0, 1].map(|half: usize| match part {
-                    0 => halves[half][0] / halves[half][2],
-                    _ => halves[half][1] * self.tempered_scale[half],
-                })
-            });
+    fn variances(&self, i: usize, importances: &[f64]) -> [f64; 2] {
+        let [mut u, mut t, mut seen] = [0.0; 3];
+        for (halves, importance) in self.probes[i].iter().zip(importances) {
             let counts = halves.map(|half| half[2]);
             if counts.contains(&0.0) {
                 continue;
             }
-            both += 1.0;
-            let mean = |[a, b]: [f64; 2]| 0.5 * (a + b);
-            let luminance = (hot[0] * counts[0] + hot[1] * counts[1]) / (counts[0] + counts[1]) + mean(tempered);
-            let importance = 1.0 / (luminance * luminance + (FLOOR * self.mean).powi(2));
+            seen += 1.0;
+            let [hot, tempered] = self.parts(halves);
             // per point: a half of n points has n times less variance
             u += importance * (hot[0] - hot[1]).powi(2) / (1.0 / counts[0] + 1.0 / counts[1]);
             let spread = (tempered[0] - tempered[1]).powi(2) / 4.0;
-            t += importance * (spread + self.normaliser_variance * mean(tempered).powi(2)) * self.states;
+            let mean = 0.5 * (tempered[0] + tempered[1]);
+            t += importance * (spread + self.normaliser_variance * mean * mean) * self.states;
         }
-        if both == 0.0 {
-            return [0.0; 2];
-        }
-        [u * self.pixels / both, t / both]
+        if seen == 0.0 { [0.0; 2] } else { [u * self.pixels / seen, t / seen] }
     }
 }
 
 /// Chains that are to have any say get this share at least.
 const MOST_WITH_CHAINS: f64 = 31.0 / 32.0;
+/// The ratio of the most evenly weighed image, 1.
+const EVEN: usize = RATIOS.len() - 2;
+/// Probes whose median stands for the luminance of the one in their middle.
+const NEIGHBOURS: usize = 9;

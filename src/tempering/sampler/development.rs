@@ -22,8 +22,8 @@ impl<W: Default + Send> Sampler<W> {
         let mut pending = Tally::new(self.round.ladder.rungs(), self.screen.layers.count);
         let mut groups: Vec<Vec<Histogram>> = Vec::with_capacity(self.portions.len());
         let canvas = self.screen.canvas();
-        for portion in &self.portions {
-            let mut group = self.group(portion);
+        for (number, portion) in self.portions.iter().enumerate() {
+            let mut group = self.group(number);
             if let Some(block) = &portion.ladders {
                 pending.histograms.fill(Histogram::default());
                 block.pending(&canvas, &self.round, &mut pending);

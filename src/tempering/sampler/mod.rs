@@ -17,7 +17,7 @@ pub use development::Development;
 pub use learnt::Learnt;
 
 use super::{
-    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, ProbeMap, Probes, Round, RoundReport,
+    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport,
     StepMix, Tally, Weights, independent::Independent, steps::StepCount, tuning::Choice,
 };
 use crate::{
@@ -79,6 +79,7 @@ struct Screen {
     layers: Layers,
     map: ProbeMap,
     probes: Option<Probes>,
+    groups: PointGroups,
 }
 
 /// One block of ladders and one of independent points, with what they saw.
@@ -147,6 +148,7 @@ impl<W: Default + Send> Sampler<W> {
             layers,
             probes: learns.then(|| Probes::new(&map, unit)),
             map,
+            groups: PointGroups::new(plan.blocks),
         };
         let portion = |number: usize| Portion {
             uniform: Independent::new(rng, (number, plan.blocks), size),
@@ -215,7 +217,8 @@ impl<W: Default + Send> Sampler<W> {
             if self.schedule.done == self.schedule.length {
                 self.end_round(target);
             }
-            let now = sweeps.min(self.schedule.length - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
+            let stop = if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
+            let now = sweeps.min(stop - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
             self.work(target, now);
             sweeps -= now;
         }
@@ -225,6 +228,7 @@ impl<W: Default + Send> Sampler<W> {
     fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
         let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
+        let half = usize::from(schedule.done >= schedule.middle());
         self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
             let canvas = screen.canvas();
             let Portion { uniform, tally, ladders, starts, .. } = portion;
@@ -239,9 +243,10 @@ impl<W: Default + Send> Sampler<W> {
                 };
                 uniform.sweep(target, schedule.points, &canvas, round, tally, keep);
             }
-            tally.deposit(&canvas, number);
+            uniform.settle(&canvas, tally);
+            tally.deposit(&canvas, half);
             if let Some(block) = ladders {
-                block.deposit(&canvas, number);
+                block.deposit(&canvas, number % 2);
             }
         });
         for portion in &mut self.portions {
@@ -308,6 +313,13 @@ impl<W: Default + Send> Sampler<W> {
     }
 }
 
+impl Schedule {
+    /// Sweep of the round at which its second half begins.
+    fn middle(&self) -> u64 {
+        self.length / 2
+    }
+}
+
 impl Screen {
     fn canvas(&self) -> Canvas<'_> {
         Canvas {
@@ -316,6 +328,7 @@ impl Screen {
             film: &self.film,
             layers: self.layers,
             probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
+            groups: &self.groups,
         }
     }
 }

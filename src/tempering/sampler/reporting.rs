@@ -87,8 +87,8 @@ impl<W: Default + Send> Sampler<W> {
 
     fn rung_reports(&self, learnt: &Learnt, counts: &[RungCounts]) -> Vec<RungReport> {
         let mut seen = vec![crate::tempering::Histogram::default(); self.round.ladder.rungs()];
-        for portion in &self.portions {
-            seen.iter_mut().zip(&self.group(portion)).for_each(|(sum, h)| sum.merge(h));
+        for number in 0..self.portions.len() {
+            seen.iter_mut().zip(&self.group(number)).for_each(|(sum, h)| sum.merge(h));
         }
         // tempered luminance is in units of the weights, whose normalisers are only now known
         let scale = libm::exp(learnt.normalisers.target.ln_value - self.ln_unit);

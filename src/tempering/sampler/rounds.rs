@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Learnt, MOST_AUTOMATIC, Portion, Sampler, at_most};
+use super::{Learnt, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
     chain::{Start, Target, resample},
     tempering::{
@@ -64,21 +64,22 @@ impl<W: Default + Send> Sampler<W> {
         self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
             if let Some(block) = &mut portion.ladders {
                 block.flush(&screen.canvas(), round);
-                block.deposit(&screen.canvas(), number);
+                block.deposit(&screen.canvas(), number % 2);
             }
         });
     }
 
     /// What all that is recorded says.
     fn learn(&self) -> Learnt {
-        let groups: Vec<Vec<Histogram>> = self.portions.iter().map(|portion| self.group(portion)).collect();
+        let groups: Vec<Vec<Histogram>> = (0..self.portions.len()).map(|number| self.group(number)).collect();
         Learnt::of(&self.round.ladder, &groups)
     }
 
-    /// A portion's histograms by rung.
-    pub(super) fn group(&self, portion: &Portion<W>) -> Vec<Histogram> {
+    /// Histograms by rung of group `number`: what block `number` of the ladders saw, and stratified points.
+    pub(super) fn group(&self, number: usize) -> Vec<Histogram> {
+        let portion = &self.portions[number];
         let mut group = vec![Histogram::default(); self.round.ladder.rungs()];
-        group[0].merge(&portion.tally.histograms[0]);
+        self.screen.groups.add_to(number, &mut group[0]);
         group.iter_mut().zip(&portion.past).for_each(|(sum, past)| sum.merge(past));
         if let Some(block) = &portion.ladders {
             block.add_histograms(&mut group);
@@ -98,7 +99,7 @@ impl<W: Default + Send> Sampler<W> {
         let ladder = &self.round.ladder;
         let chains = ladder.chains();
         self.ln_unit = learnt.normalisers.target.ln_value;
-        self.offers = chains;
+        self.offers = 1;
         let remaining = self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations));
         let ladders = self.plan.groups_a_block(remaining, 2 * chains);
         let samples: Vec<Start> = self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
@@ -119,7 +120,7 @@ impl<W: Default + Send> Sampler<W> {
         self.ladders_a_block = ladders;
         self.rays_a_point = self.rays as f64 / self.evaluations as f64;
         self.round.mixes = vec![StepMix::kelemen(); chains + 1];
-        self.choice = Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
+        self.choice = Choice { ratio: std::env::var("RHO").map(|v| v.parse().unwrap()).unwrap_or(FIRST_RATIO), share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
             LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
@@ -135,12 +136,13 @@ impl<W: Default + Send> Sampler<W> {
         let choice = self.tune(learnt, last);
         let counts = self.counts_by_rung();
         for (mix, counts) in self.round.mixes.iter_mut().zip(&counts).skip(1) {
-            *mix = mix.tuned(&counts.steps);
+            if std::env::var("KEL").is_err() { *mix = mix.tuned(&counts.steps); }
         }
         if !last && !matches!(self.choices.ladder, LadderChoice::Betas(_)) {
             said.extend(self.place_anew(learnt));
         }
         if let Some(choice) = choice {
+            let choice = if let Ok(v) = std::env::var("RHO") { Choice { ratio: v.parse().unwrap(), share: self.choices.uniform_share.unwrap_or(choice.share), ..choice } } else { choice };
             self.choice = choice;
             said.push(match choice.ratio {
                 0.0 => "path tracing: no share of chains makes the error less".into(),
@@ -190,7 +192,6 @@ impl<W: Default + Send> Sampler<W> {
         };
         let shares = self.choices.uniform_share.map_or(LEAST_UNIFORM..=most, |share| share..=share);
         let states = (self.schedule.done * self.ladders()) as f64;
-        let points = (self.schedule.done as usize * self.portions.len() * self.points_a_block()) as f64;
         let chains = self.round.ladder.chains() as f64;
         let pixels = f64::from(self.screen.size[0]) * f64::from(self.screen.size[1]);
         let target = learnt.normalisers.target;
@@ -198,9 +199,8 @@ impl<W: Default + Send> Sampler<W> {
         let measured = Measured {
             probes: (0..RATIOS.len()).map(|ratio| probes.sums(ratio)).collect(),
             pixels,
-            points,
             states: chains * states,
-            tempered_scale: [scale; 2],
+            tempered_scale: scale,
             normaliser_variance: target.relative_error.powi(2),
             mean: target.value,
             cost: self.costs(chains * states),
@@ -292,7 +292,7 @@ impl<W: Default + Send> Sampler<W> {
         self.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
         self.schedule.done = 0;
         let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
-        self.round.half = sweeps + self.schedule.length / 2;
+        self.round.half = sweeps + self.schedule.middle();
     }
 
     /// Uniform points of a block in a sweep, offered or not.
