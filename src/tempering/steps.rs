@@ -95,7 +95,7 @@ impl StepMix {
                 return self.weights[i];
             }
             let a = counts[i].acceptance().clamp(1e-4, 1.0 - 1e-4);
-            libm::exp(-0.5 * (logit(a) - logit(AIM)).powi(2))
+            libm::exp(-0.5 * ((logit(a) - logit(std::env::var("AIM").map_or(AIM, |v| v.parse().unwrap()))) / std::env::var("SIG").map_or(1.0, |v| v.parse::<f64>().unwrap())).powi(2))
         });
         let sum: f64 = weights.iter().sum();
         StepMix { weights: weights.map(|w| (w / sum).max(TRIAL)) }.normalised()

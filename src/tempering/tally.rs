@@ -123,6 +123,8 @@ pub struct Round {
     /// Weight on the film of a uniform point and of a state, by which rounds count in proportion to their length
     /// whatever their share of uniform points is.
     pub effort: [f64; 2],
+    /// All uniform points are offered ones.
+    pub only_offers: bool,
     /// Sweep of the ladders at which the second half of the round begins.
     pub half: u64,
 }
@@ -176,8 +178,8 @@ impl Tally {
         }
     }
 
-    /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind: offered
-    /// ones are noisier.
+    /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind, where there
+    /// are any: offered ones are noisier.
     #[inline(always)]
     pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution, stratified: bool) {
         self.histograms[0].add(point.ln_g, 1.0);
@@ -193,7 +195,7 @@ impl Tally {
             recorder.splat(layer, point, share, effort);
             self.counts[0].luminance += share * point.g();
         }
-        if let Some(probe) = canvas.probe(point).filter(|_| stratified) {
+        if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
             let g = point.g();
             Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
         }

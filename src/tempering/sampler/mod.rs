@@ -169,6 +169,7 @@ impl<W: Default + Send> Sampler<W> {
                 weights: Weights::uniform_alone(),
                 mixes: vec![StepMix::kelemen()],
                 effort: [1.0, 0.0],
+                only_offers: false,
                 half: u64::MAX,
             },
             schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },

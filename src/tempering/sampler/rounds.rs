@@ -292,6 +292,7 @@ impl<W: Default + Send> Sampler<W> {
         self.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
         self.schedule.done = 0;
         let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
+        self.round.only_offers = self.schedule.points == 0;
         self.round.half = sweeps + self.schedule.middle();
     }
 
