@@ -1,17 +1,17 @@
 //! Ladders side by side: what one thread works on at a time.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use rayon::prelude::*;
 
 use super::{
-    Canvas, Histogram, Round, RungCounts, Tally,
+    Canvas, Histogram, Round, RungCounts, Sum, Tally,
     ladder::swap_acceptance,
     steps::{self, SCALES},
     trips::{IndexProcess, Trips},
 };
 use crate::{
-    chain::{Evaluator, Start, Target, Walkers, replay},
+    chain::{Evaluator, Importance, Start, Target, Walkers, replay},
     path::Contribution,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
@@ -121,7 +121,8 @@ impl<W: Default + Send> Block<W> {
         for number in 0..parts {
             let start = number * self.lanes_a_part;
             let range = start..(start + self.lanes_a_part).min(lanes);
-            let evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
+            let mut evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
+            evaluator.importance = self.parts[0].evaluator.importance.clone();
             match self.parts.get_mut(number) {
                 Some(part) => (part.lanes, part.evaluator) = (range, evaluator),
                 None => self.parts.push(Part {
@@ -162,6 +163,11 @@ impl<W: Default + Send> Block<W> {
     /// Part of a lane, and its place there.
     fn place(&self, lane: usize) -> (usize, usize) {
         (lane / self.lanes_a_part, lane % self.lanes_a_part)
+    }
+
+    /// Scalar contributions are weighed by this importance, if there is any; from before the first state on.
+    pub fn set_importance(&mut self, importance: Option<&Arc<Importance>>) {
+        self.parts.iter_mut().for_each(|part| part.evaluator.importance = importance.cloned());
     }
 
     /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block.
@@ -297,6 +303,16 @@ impl<W: Default + Send> Block<W> {
         for part in &mut self.parts {
             part.tally.histograms[1..].fill(Histogram::default());
         }
+    }
+
+    /// What uniform points and tempered states added to the balanced image.
+    pub fn added(&self) -> [Sum; 2] {
+        let mut sums = [Sum::default(); 2];
+        for Part { tally, .. } in &self.parts {
+            sums[0].merge(tally.hot);
+            sums[1].merge(tally.tempered);
+        }
+        sums
     }
 
     /// Adds the round's counts, by rung.

@@ -4,9 +4,11 @@
 //! the even order of a path tracer (ALGORITHM section 11). Where nothing but such points is drawn, relt is a path
 //! tracer.
 
+use std::sync::Arc;
+
 use super::{Canvas, Round, Tally};
 use crate::{
-    chain::{Evaluator, Start, Target},
+    chain::{Evaluator, Importance, Start, Target},
     rng::{Counter, Purpose, Rng},
     sample::{Move, PixelOrder, Points},
 };
@@ -66,7 +68,7 @@ impl<W: Default> Independent<W> {
             let lanes = left.min(LANES);
             let group = self.group(next);
             if group != self.group {
-                canvas.groups.take(self.group, &mut tally.histograms[0]);
+                canvas.groups.take(self.group, tally);
                 self.group = group;
             }
             self.evaluator.moves[..lanes].fill(Move::Stratified);
@@ -99,7 +101,12 @@ impl<W: Default> Independent<W> {
 
     /// Hands over what was seen and not yet given to its group.
     pub fn settle(&mut self, canvas: &Canvas, tally: &mut Tally) {
-        canvas.groups.take(self.group, &mut tally.histograms[0]);
+        canvas.groups.take(self.group, tally);
+    }
+
+    /// From now on scalar contributions are weighed by this importance.
+    pub fn set_importance(&mut self, importance: &Arc<Importance>) {
+        self.evaluator.importance = Some(importance.clone());
     }
 
     /// Rays traced and contributions settled since this was last asked for.

@@ -63,6 +63,8 @@ pub struct Canvas<'a> {
     pub size: [u32; 2],
     /// The film.
     pub film: &'a Accumulator,
+    /// Typical magnitude of the brightest f.
+    pub unit: f64,
     /// What its layers hold.
     pub layers: Layers,
     /// Probes, while there is something to learn.
@@ -73,7 +75,41 @@ pub struct Canvas<'a> {
 
 /// ln g of stratified points in groups that may be taken as independent. Histograms are exact, so it does not matter who
 /// adds to them when.
-pub struct PointGroups(Vec<Mutex<Histogram>>);
+pub struct PointGroups(Vec<Mutex<Seen>>);
+
+/// Stratified points of one group.
+#[derive(Clone, Debug, Default)]
+struct Seen {
+    histogram: Histogram,
+    hot: Sum,
+}
+
+/// Σ of luminances that went to the balanced image, in units of 2⁻⁶⁰ of the film's, and Σ of weights that went with
+/// them, in units of 2⁻²⁰: integers, which do not depend on the order of addition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sum {
+    luminance: i128,
+    weight: u128,
+}
+
+impl Sum {
+    #[inline(always)]
+    fn add(&mut self, luminance: f64, weight: f64) {
+        self.luminance = self.luminance.saturating_add((luminance * 1_152_921_504_606_846_976.0) as i128);
+        self.weight += (weight * 1_048_576.0 + 0.5) as u128;
+    }
+
+    /// Adds another sum.
+    pub fn merge(&mut self, other: Sum) {
+        self.luminance = self.luminance.saturating_add(other.luminance);
+        self.weight += other.weight;
+    }
+
+    /// Luminance, in the film's unit, and weight.
+    pub fn values(self) -> (f64, f64) {
+        (self.luminance as f64 / 1_152_921_504_606_846_976.0, self.weight as f64 / 1_048_576.0)
+    }
+}
 
 impl PointGroups {
     /// So many groups, all empty.
@@ -81,19 +117,30 @@ impl PointGroups {
         PointGroups((0..groups).map(|_| Mutex::default()).collect())
     }
 
-    /// Adds to a group what a histogram has, and empties that.
-    pub fn take(&self, group: usize, from: &mut Histogram) {
-        self.locked(group).merge(from);
-        *from = Histogram::default();
+    /// Adds to a group what a tally has seen of the uniform rung, which forgets it.
+    pub fn take(&self, group: usize, tally: &mut Tally) {
+        let mut seen = self.locked(group);
+        seen.histogram.merge(&std::mem::take(&mut tally.histograms[0]));
+        seen.hot.merge(std::mem::take(&mut tally.hot));
     }
 
     /// Adds a group's points to `sum`.
     pub fn add_to(&self, group: usize, sum: &mut Histogram) {
-        sum.merge(&self.locked(group));
+        sum.merge(&self.locked(group).histogram);
+    }
+
+    /// What a group's points added to the balanced image.
+    pub fn hot(&self, group: usize) -> Sum {
+        self.locked(group).hot
+    }
+
+    /// Forgets ln g, which is about to mean something else.
+    pub fn forget_histograms(&self) {
+        (0..self.0.len()).for_each(|group| self.locked(group).histogram = Histogram::default());
     }
 
     /// The group, even if another thread panicked with it in hand.
-    fn locked(&self, group: usize) -> MutexGuard<'_, Histogram> {
+    fn locked(&self, group: usize) -> MutexGuard<'_, Seen> {
         self.0[group].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -165,6 +212,10 @@ pub struct Tally {
     /// Splats not yet on the film.
     pub splats: Splats,
     probes: Splats,
+    /// What uniform points added to the balanced image, since ever or since it was taken.
+    pub hot: Sum,
+    /// The same of tempered states, since ever.
+    pub tempered: Sum,
 }
 
 impl Tally {
@@ -175,6 +226,8 @@ impl Tally {
             counts: vec![RungCounts::default(); rungs],
             splats: Splats::new(layers),
             probes: Probes::splats(),
+            hot: Sum::default(),
+            tempered: Sum::default(),
         }
     }
 
@@ -193,10 +246,11 @@ impl Tally {
             let [effort, _] = round.effort;
             let share = effort * round.weights.uniform(mixture);
             recorder.splat(layer, point, share, effort);
-            self.counts[0].luminance += share * point.g();
+            self.counts[0].luminance += share * point.luminance();
+            self.hot.add(share * point.luminance() / canvas.unit, effort);
         }
         if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
-            let g = point.g();
+            let g = point.luminance();
             Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
         }
     }
@@ -218,9 +272,10 @@ impl Tally {
         if let Some(first) = canvas.layers.rungs {
             recorder.splat(first + k - 1, state, value, effort * weight);
         }
-        self.counts[k].luminance += value * state.g();
+        self.counts[k].luminance += value * state.luminance();
+        self.tempered.add(value * state.luminance() / canvas.unit, effort * weight);
         if let Some(probe) = canvas.probe(state) {
-            let g = state.g() * weight;
+            let g = state.luminance() * weight;
             Probes::tempered(&mut self.probes, probe, |ratio| g * round.weights.tempered_with(ratio, mixture));
         }
     }

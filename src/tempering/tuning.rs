@@ -13,6 +13,7 @@
 //! the same job makes the same choices everywhere.
 
 use super::probes::RATIOS;
+use crate::chain::Measure;
 
 /// What a round has measured.
 pub struct Measured<'a> {
@@ -26,7 +27,9 @@ pub struct Measured<'a> {
     pub tempered_scale: f64,
     /// (standard error/value)² of Ẑ_K.
     pub normaliser_variance: f64,
-    /// c, the mean of the image.
+    /// The error to make small.
+    pub measure: Measure,
+    /// Mean luminance of the image.
     pub mean: f64,
     /// Cost of an evaluation on the uniform rung and on the others.
     pub cost: [f64; 2],
@@ -44,10 +47,6 @@ pub struct Choice {
     /// Error at unit cost over that of path tracing.
     pub relative_error: f64,
 }
-
-/// Pixels count by 1/(I² + (c/2)²), I their luminance: close to the relative error where it is bright, to the absolute
-/// one where it is darker than half the mean.
-const FLOOR: f64 = 0.5;
 
 impl Measured<'_> {
     /// The best choice; path tracing where nothing was seen or nothing is better.
@@ -92,7 +91,7 @@ impl Measured<'_> {
                 let mut near: Vec<f64> = near.iter().copied().filter(|l| !l.is_nan()).collect();
                 near.sort_by(f64::total_cmp);
                 let median = near.get(near.len() / 2).copied().unwrap_or(self.mean);
-                1.0 / (median * median + (FLOOR * self.mean).powi(2))
+                self.measure.weight(median, self.mean)
             })
             .collect()
     }

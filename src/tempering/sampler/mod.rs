@@ -11,22 +11,25 @@ mod learnt;
 mod reporting;
 mod rounds;
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 pub use development::Development;
 pub use learnt::Learnt;
 
 use super::{
-    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport,
+    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport, Sum,
     StepMix, Tally, Weights, independent::Independent, steps::StepCount, tuning::Choice,
 };
 use crate::{
-    chain::{Plan, Start, Target},
+    chain::{Importance, Measure, Plan, Start, Target},
     film::{Accumulator, Footprint},
     rng::Rng,
 };
 
-/// Uniform points before chains start; a sixteenth of the run where that is less.
+/// Uniform points before chains start, and before that where it is to be learnt where chains are wanted; a 32nd of the
+/// run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
@@ -40,6 +43,8 @@ pub struct Sampler<W> {
     portions: Vec<Portion<W>>,
     round: Round,
     schedule: Schedule,
+    /// Where chains are wanted; absent where they follow the luminance itself, and before that is known.
+    importance: Option<Arc<Importance>>,
     /// Magnitude of c, fixed when chains start.
     ln_unit: f64,
     /// Points offered to a ladder each sweep.
@@ -87,8 +92,9 @@ struct Portion<W> {
     uniform: Independent<W>,
     tally: Tally,
     ladders: Option<Block<W>>,
-    /// What ladders saw that are given up.
+    /// What ladders saw that are given up, and what they added to the image.
     past: Vec<Histogram>,
+    added: [Sum; 2],
     starts: Vec<Start>,
 }
 
@@ -155,11 +161,12 @@ impl<W: Default + Send> Sampler<W> {
             tally: Tally::new(1, layers.count),
             ladders: None,
             past: Vec::new(),
+            added: [Sum::default(); 2],
             starts: Vec::new(),
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
         let only_uniform = most_rungs == 1;
-        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 16.0).div_ceil(a_sweep) };
+        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
         Sampler {
             rng,
             screen,
@@ -175,6 +182,7 @@ impl<W: Default + Send> Sampler<W> {
             schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },
             plan,
             choices,
+            importance: None,
             ln_unit: 0.0,
             offers: 0,
             ladders_a_block: 0,
@@ -308,6 +316,11 @@ impl<W: Default + Send> Sampler<W> {
         (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
     }
 
+    /// Whether chains follow the luminance weighed by an importance: only the balanced image allows for that.
+    fn weighs(&self) -> bool {
+        self.choices.combine == Combine::Balance && self.choices.measure == Measure::Relative
+    }
+
     /// Reports of the rounds that ended since this was last asked for.
     pub fn take_reports(&mut self) -> Vec<RoundReport> {
         std::mem::take(&mut self.reports)
@@ -327,6 +340,7 @@ impl Screen {
             footprint: &self.footprint,
             size: self.size,
             film: &self.film,
+            unit: self.unit,
             layers: self.layers,
             probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
             groups: &self.groups,

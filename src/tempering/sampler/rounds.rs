@@ -1,12 +1,15 @@
 //! Ends of rounds: what was learnt, and what follows from it.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::{Learnt, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
-    chain::{Start, Target, resample},
+    chain::{Importance, Start, Target, resample},
+    scene::Rgb,
     tempering::{
-        Block, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Weights,
+        Block, Estimate, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Sum, Weights,
         placement::rungs,
         probes::RATIOS,
         tuning::{Choice, Measured},
@@ -48,6 +51,10 @@ impl<W: Default + Send> Sampler<W> {
                 self.schedule.length *= 2;
                 return;
             }
+            (0, true) if self.weighs() && self.importance.is_none() => {
+                self.weigh();
+                return;
+            }
             (0, true) => self.raise_ladders(target, &learnt),
             _ if self.schedule.frozen => Vec::new(),
             _ => self.adapt(&learnt),
@@ -56,6 +63,24 @@ impl<W: Default + Send> Sampler<W> {
         report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.effort);
         self.reports.push(report);
         self.begin_round(&learnt);
+    }
+
+    /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
+    fn weigh(&mut self) {
+        let layer = self.screen.layers.hot.expect("a balanced image");
+        let luminance = |[r, g, b, points]: [f64; 4]| {
+            let rgb = Rgb::new(r as f32, g as f32, b as f32);
+            [f64::from(crate::path::luminance(rgb)), points]
+        };
+        let found: Vec<[f64; 2]> = self.screen.film.layer(layer).into_iter().map(luminance).collect();
+        let importance = Arc::new(Importance::new(self.screen.size, &found));
+        for portion in &mut self.portions {
+            portion.uniform.set_importance(&importance);
+            portion.starts.clear();
+        }
+        self.importance = Some(importance);
+        self.screen.groups.forget_histograms();
+        self.schedule.length += self.schedule.done;
     }
 
     /// Records what states have gathered; the round's settings still hold.
@@ -72,7 +97,25 @@ impl<W: Default + Send> Sampler<W> {
     /// What all that is recorded says.
     fn learn(&self) -> Learnt {
         let groups: Vec<Vec<Histogram>> = (0..self.portions.len()).map(|number| self.group(number)).collect();
-        Learnt::of(&self.round.ladder, &groups)
+        self.learnt(&groups, &[])
+    }
+
+    /// What groups of histograms say; `pending` is what each block's states would add to the balanced image.
+    pub(super) fn learnt(&self, groups: &[Vec<Histogram>], pending: &[Sum]) -> Learnt {
+        let (mut hot, mut tempered) = (Vec::new(), Vec::new());
+        for (number, portion) in self.portions.iter().enumerate() {
+            let [mut points, mut states] = portion.ladders.as_ref().map_or(portion.added, Block::added);
+            points.merge(self.screen.groups.hot(number));
+            pending.get(number).into_iter().for_each(|sum| states.merge(*sum));
+            hot.push(points.values());
+            // each block's states stand for as much of the image as any other's
+            tempered.push((states.values().0, self.effort / self.portions.len() as f64));
+        }
+        let parts = [hot, tempered].map(|sums| {
+            let sums: Vec<(f64, f64)> = sums.into_iter().map(|(s, n)| (s * self.screen.unit, n)).collect();
+            Estimate::from_sums(&sums)
+        });
+        Learnt::of(&self.round.ladder, groups, parts, self.ln_unit)
     }
 
     /// Histograms by rung of group `number`: what block `number` of the ladders saw, and stratified points.
@@ -110,10 +153,12 @@ impl<W: Default + Send> Sampler<W> {
             .map(|(rung, &beta)| resample(&samples, beta, all, self.rng, rung as u32))
             .collect();
         let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.offers, self.screen.size);
+        let importance = self.importance.as_ref();
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
             let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
             let mut block = Block::new(rng, (first as u32, ladders), chains + 1, offers, LANES_A_PART, layers, size);
+            block.set_importance(importance);
             block.start(target, &starts);
             portion.ladders = Some(block);
         });
@@ -202,7 +247,8 @@ impl<W: Default + Send> Sampler<W> {
             states: chains * states,
             tempered_scale: scale,
             normaliser_variance: target.relative_error.powi(2),
-            mean: target.value,
+            measure: self.choices.measure,
+            mean: learnt.luminance.value,
             cost: self.costs(chains * states),
             shares: &shares,
         };
@@ -243,6 +289,7 @@ impl<W: Default + Send> Sampler<W> {
                 let mut past = vec![Histogram::default(); self.round.ladder.rungs()];
                 block.add_histograms(&mut past);
                 portion.past = past;
+                portion.added = block.added();
             }
         }
     }
