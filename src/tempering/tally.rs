@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::{
     Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
+    probes::TRIALS,
     steps::{SCALES, StepCount},
 };
 use crate::{
@@ -165,8 +166,8 @@ pub struct Round {
     pub ladder: Ladder,
     /// How samples enter the image.
     pub weights: Weights,
-    /// How chains move, by rung; the first entry is unused.
-    pub mixes: Vec<StepMix>,
+    /// How chains move, by trial and rung; the first rung is unused.
+    pub mixes: [Vec<StepMix>; TRIALS],
     /// Weight on the film of a uniform point and of a state, by which rounds count in proportion to their length
     /// whatever their share of uniform points is.
     pub effort: [f64; 2],
@@ -275,16 +276,16 @@ impl Tally {
         self.counts[k].luminance += value * state.luminance();
         self.tempered.add(value * state.luminance() / canvas.unit, effort * weight);
         if let Some(probe) = canvas.probe(state) {
-            let g = state.luminance() * weight;
-            Probes::tempered(&mut self.probes, probe, |ratio| g * round.weights.tempered_with(ratio, mixture));
+            let g = state.luminance();
+            Probes::tempered(&mut self.probes, probe, weight, |ratio| g * round.weights.tempered_with(ratio, mixture));
         }
     }
 
-    /// Puts what was splatted onto the film, and into that half of the probes.
-    pub fn deposit(&mut self, canvas: &Canvas, half: usize) {
+    /// Puts what was splatted onto the film, and into that half and trial of the probes.
+    pub fn deposit(&mut self, canvas: &Canvas, half: usize, trial: Option<usize>) {
         canvas.film.deposit(&mut self.splats);
         match canvas.probes {
-            Some((_, probes)) => probes.deposit(half, &mut self.probes),
+            Some((_, probes)) => probes.deposit(half, trial, &mut self.probes),
             None => self.probes.clear(),
         }
     }

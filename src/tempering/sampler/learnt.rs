@@ -38,9 +38,9 @@ impl Learnt {
             return Vec::new();
         }
         vec![format!(
-            "the uniform replica alone estimates a mean luminance of {:.4} ± {:.4}, all replicas together {:.4} ± {:.4}: \
-             chains may not find all of the light; render longer or compare with --method path",
-            uniform.value, uniform.standard_error, mbar.value, mbar.standard_error
+            "the uniform replica alone estimates ln c = {:.4} ± {:.4}, all replicas together {:.4} ± {:.4}: chains may not \
+             find all of the light; render longer or compare with --method path",
+            uniform.ln_value, uniform.relative_error, mbar.ln_value, mbar.relative_error
         )]
     }
 }

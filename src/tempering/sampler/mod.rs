@@ -20,7 +20,7 @@ pub use learnt::Learnt;
 
 use super::{
     Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport, Sum,
-    StepMix, Tally, Weights, independent::Independent, steps::StepCount, tuning::Choice,
+    Tally, Weights, independent::Independent, probes::TRIALS, steps::{self, StepCount}, tuning::Choice,
 };
 use crate::{
     chain::{Importance, Measure, Plan, Start, Target},
@@ -52,6 +52,8 @@ pub struct Sampler<W> {
     ladders_a_block: usize,
     /// Weights and shares of the round.
     choice: Choice,
+    /// Centre of the sizes of steps on the target, in scales of the bank.
+    centre: f64,
     /// Rungs were moved for the next round.
     moved: bool,
     /// Rays of the ladders in this round, offered points included.
@@ -174,7 +176,7 @@ impl<W: Default + Send> Sampler<W> {
             round: Round {
                 ladder: Ladder::uniform(),
                 weights: Weights::uniform_alone(),
-                mixes: vec![StepMix::kelemen()],
+                mixes: [(); TRIALS].map(|()| Vec::new()),
                 effort: [1.0, 0.0],
                 only_offers: false,
                 half: u64::MAX,
@@ -187,6 +189,7 @@ impl<W: Default + Send> Sampler<W> {
             offers: 0,
             ladders_a_block: 0,
             choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            centre: steps::KELEMEN,
             moved: false,
             ladder_rays: 0,
             image_correlation: None,
@@ -238,7 +241,7 @@ impl<W: Default + Send> Sampler<W> {
         let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
         let half = usize::from(schedule.done >= schedule.middle());
-        self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
+        self.portions.par_iter_mut().for_each(|portion| {
             let canvas = screen.canvas();
             let Portion { uniform, tally, ladders, starts, .. } = portion;
             for _ in 0..sweeps {
@@ -253,9 +256,9 @@ impl<W: Default + Send> Sampler<W> {
                 uniform.sweep(target, schedule.points, &canvas, round, tally, keep);
             }
             uniform.settle(&canvas, tally);
-            tally.deposit(&canvas, half);
+            tally.deposit(&canvas, half, None);
             if let Some(block) = ladders {
-                block.deposit(&canvas, number % 2);
+                block.deposit(&canvas);
             }
         });
         for portion in &mut self.portions {

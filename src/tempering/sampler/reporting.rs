@@ -3,7 +3,7 @@
 use super::{Learnt, Sampler};
 use crate::tempering::{
     Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport, steps,
-    trips::Dwell,
+    probes::TRIALS, trips::Dwell,
 };
 
 /// β at which the local barrier is told.
@@ -125,7 +125,7 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     fn scale_reports(&self, k: usize, counts: &RungCounts) -> Vec<ScaleReport> {
-        let weights = self.round.mixes[k].weights();
+        let weights = self.round.mixes[TRIALS / 2][k].weights();
         let report = |i: usize| ScaleReport {
             size: steps::size(i),
             weight: weights[i],
