@@ -1,6 +1,6 @@
 //! What the stages of a mutation cost, each alone, in mutations a second on one thread.
 //!
-//! - `propose`: random words and points, fresh or by small steps, as many blocks as paths of that scene use;
+//! - `propose`: random words and points, fresh, stratified or by small steps, as many blocks as paths of that scene use;
 //! - `evaluate`: points to contributions, with `propose` and tracing;
 //! - `trace`: Embree alone, on the rays of those points;
 //! - `splat`: contributions through the filter onto the film;
@@ -85,7 +85,8 @@ fn propose(group: &mut BenchmarkGroup<WallTime>, scene: &Scene, widths: Widths) 
     let mut paths = evaluator::<Workspace>();
     paths.evaluate(&Mapping::new(scene, widths), &Points::new(0));
     let draw = DrawOnly::like(&paths.points);
-    for (name, how) in [("fresh", Move::Fresh), ("small", Move::Small(StepLaw::KELEMEN))] {
+    let small = Move::Small(StepLaw::KELEMEN);
+    for (name, how) in [("fresh", Move::Fresh), ("stratified", Move::Stratified), ("small", small)] {
         let mut proposals = evaluator();
         proposals.moves.fill(how);
         group.bench_function(BenchmarkId::new("propose", name), |bencher| {

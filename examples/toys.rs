@@ -9,7 +9,7 @@
 use clap::Parser;
 use rayon::prelude::*;
 use relt::{
-    chain::{Evaluator, LARGE_STEP_PROBABILITY, LargeSteps},
+    chain::{Measure, Evaluator, LARGE_STEP_PROBABILITY, LargeSteps},
     film::{Filter, Footprint, Heuristic, Image, Plane},
     path::Contribution,
     rng::{Counter, Purpose, Rng},
@@ -139,7 +139,7 @@ fn plain(toy: &Toy, evaluations: u64, seed: u64) -> Vec<f64> {
         batch.counters.iter_mut().zip(done..).for_each(|(c, step)| *c = counter(step));
         batch.evaluate(toy, &Points::new(0));
         for point in &batch.out.lanes {
-            sums[(point.film[0] * COLUMNS as f32) as usize] += Contribution::g(point);
+            sums[(point.film[0] * COLUMNS as f32) as usize] += Contribution::luminance(point);
         }
     }
     let a_column = evaluations.next_multiple_of(LANES) as f64 / f64::from(COLUMNS);
@@ -151,7 +151,7 @@ fn sample(toy: &Toy, ladder: LadderChoice, combine: Combine, evaluations: u64, s
     let paper = combine != Combine::Balance;
     let mut sampler = Sampler::new(Setup {
         rng: Rng::new(seed),
-        choices: Choices { ladder, combine, uniform_share: None, layers: paper },
+        choices: Choices { ladder, combine, uniform_share: None, measure: Measure::Absolute, layers: paper },
         footprint: Footprint::new(Filter::Box, COLUMNS, 1),
         size: [COLUMNS, 1],
         unit: toy.c(),

@@ -105,7 +105,7 @@ impl<W: Default> Baseline<W> {
             let proposed = self.evaluator.out.lanes[lane];
             let small = self.evaluator.moves[lane] != Move::Fresh;
             if !small {
-                self.large_sum += proposed.g();
+                self.large_sum += proposed.luminance();
                 if self.large_steps.kelemen_weights && !proposed.is_dark() {
                     self.large_steps.record(baseline_layer::LARGE_STEPS, &proposed, 1.0, unit, recorder);
                 }
@@ -156,6 +156,6 @@ impl LargeSteps {
     /// Records f · weight / (g/ζ + p) with ζ = `unit`; without Kelemen's weights p counts as 0.
     fn record(&self, layer: usize, state: &Contribution, weight: f64, unit: f64, recorder: &mut Recorder) {
         let uniform_share = if self.kelemen_weights { self.probability } else { 0.0 };
-        recorder.splat(layer, state, unit * weight / (state.g() + uniform_share * unit), weight);
+        recorder.splat(layer, state, unit * weight / (state.luminance() + uniform_share * unit), weight);
     }
 }

@@ -1,6 +1,7 @@
 //! The Metropolis process: acceptance, states of many chains, and the baseline that knows no temperatures.
 
 mod baseline;
+mod importance;
 mod metropolis;
 mod plan;
 mod recorder;
@@ -9,6 +10,7 @@ mod target;
 mod walkers;
 
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, baseline_layer};
+pub use importance::{Importance, Measure};
 pub use metropolis::acceptance;
 pub use plan::Plan;
 pub use recorder::Recorder;

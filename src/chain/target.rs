@@ -1,5 +1,8 @@
 //! What chains need to know of the function they sample.
 
+use std::sync::Arc;
+
+use super::Importance;
 use crate::{
     path::{Contributions, unidirectional},
     rng::{Counter, Rng},
@@ -38,6 +41,8 @@ pub struct Evaluator<W> {
     pub points: Points,
     /// What they contribute.
     pub out: Contributions,
+    /// What the scalar contributions are weighed by; they are luminances where absent.
+    pub importance: Option<Arc<Importance>>,
     workspace: W,
 }
 
@@ -54,6 +59,7 @@ impl<W: Default> Evaluator<W> {
             rng,
             moves: vec![Move::Rest; lanes],
             film: [1, 1],
+            importance: None,
             counters,
             points: Points::new(lanes),
             out: Contributions::new(lanes),
@@ -82,5 +88,12 @@ impl<W: Default> Evaluator<W> {
             film: self.film,
         };
         target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
+        if let Some(importance) = &self.importance {
+            for (point, how) in self.out.lanes.iter_mut().zip(&self.moves) {
+                if *how != Move::Rest {
+                    point.ln_g += importance.ln_at(point.film);
+                }
+            }
+        }
     }
 }

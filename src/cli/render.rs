@@ -15,7 +15,7 @@ use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, Method, MltSettings, Normalisation, Observer, Output, PacketChoice, Picture,
+    self, Combine, Job, LadderChoice, Measure, Method, MltSettings, Normalisation, Observer, Output, PacketChoice, Picture,
     RunStart, Settings, Status, Summary,
 };
 use crate::tempering::RoundReport;
@@ -70,6 +70,10 @@ pub(super) struct Render {
     /// [default: balance]
     #[arg(long, value_parser = values::combine(), help_heading = "Method")]
     combine: Option<Combine>,
+
+    /// The error that --method re makes small: relative to the luminance of a pixel, or absolute [default: relative]
+    #[arg(long, value_parser = values::measure(), help_heading = "Method")]
+    error: Option<Measure>,
 
     /// Adds to the .exr of --method re the images of the uniform and the coldest replica, and each rung's part
     #[arg(long, help_heading = "Files")]
@@ -167,6 +171,7 @@ impl Render {
             },
             combine: self.combine.unwrap_or_default(),
             uniform_share: self.uniform_share,
+            measure: self.error.unwrap_or_default(),
             layers: self.layers,
             mlt: MltSettings {
                 large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
@@ -194,6 +199,7 @@ impl Render {
             ("--betas", self.betas.is_some()),
             ("--combine", self.combine.is_some()),
             ("--uniform-share", self.uniform_share.is_some()),
+            ("--error", self.error.is_some()),
             ("--layers", self.layers),
             ("--verbose", self.verbose),
         ];

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::embree::Width;
-use crate::render::{Combine, LadderChoice, Method, Normalisation, PacketChoice};
+use crate::render::{Combine, LadderChoice, Measure, Method, Normalisation, PacketChoice};
 
 /// `name=value`.
 pub(super) fn define(text: &str) -> Result<(String, String), String> {
@@ -40,6 +40,10 @@ pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {
         "auto" => Ok(LadderChoice::Auto),
         _ => text.parse().map(LadderChoice::Replicas).map_err(|_| "accepted are auto and numbers from 1 to 1024".into()),
     }
+}
+
+pub(super) fn measure() -> impl TypedValueParser<Value = Measure> {
+    one_of(&Measure::ALL, |measure| measure.name())
 }
 
 pub(super) fn combine() -> impl TypedValueParser<Value = Combine> {

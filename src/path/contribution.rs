@@ -16,7 +16,8 @@ pub struct Contribution {
     pub film: [f32; 2],
     /// f: radiance over the density of the mapping, per channel; finite and not negative.
     pub rgb: Rgb,
-    /// ln g, the natural logarithm of the luminance of f; −∞ where that is 0; never NaN or +∞.
+    /// ln g, the natural logarithm of the scalar contribution that chains follow: the luminance of f, weighed by an
+    /// [`Importance`](crate::chain::Importance) where there is one; −∞ where that is 0; never NaN or +∞.
     pub ln_g: f64,
 }
 
@@ -39,8 +40,8 @@ impl Contribution {
         (Contribution { film, ..Contribution::NONE }, fault)
     }
 
-    /// g itself.
-    pub fn g(&self) -> f64 {
+    /// The luminance of f.
+    pub fn luminance(&self) -> f64 {
         f64::from(luminance(self.rgb))
     }
 

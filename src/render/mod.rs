@@ -15,5 +15,5 @@ mod tests;
 
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};
-pub use settings::{Combine, LadderChoice, Method, MltSettings, Normalisation, PacketChoice, Settings};
+pub use settings::{Combine, LadderChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings};
 pub use status::{Observer, RunStart, Status, Summary};

@@ -66,7 +66,7 @@ impl Engine for ReplicaExchange {
         Development {
             image: developed.image,
             layers: developed.layers,
-            normalisation: Some(developed.learnt.normalisers.target),
+            normalisation: Some(developed.learnt.luminance),
             warnings,
         }
     }

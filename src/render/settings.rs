@@ -6,13 +6,14 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use crate::chain::LARGE_STEP_PROBABILITY;
+pub use crate::chain::Measure;
 use crate::embree::Width;
 pub use crate::tempering::{Choices, Combine, LadderChoice};
 
 /// How the image is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Method {
-    /// Independent samples and nothing else.
+    /// Stratified samples and nothing else.
     #[serde(rename = "path")]
     Path,
     /// Primary-sample Metropolis light transport (Kelemen et al. 2002), normalised by independent samples beforehand.
@@ -140,6 +141,8 @@ pub struct Settings {
     pub combine: Combine,
     /// Share of evaluations that are uniform points, for replica exchange; tuned where absent.
     pub uniform_share: Option<f64>,
+    /// The error that replica exchange is to make small.
+    pub measure: Measure,
     /// Write every rung's part of the image, for replica exchange.
     pub layers: bool,
     /// Large steps and their use, for `mlt`.
@@ -163,6 +166,7 @@ impl Default for Settings {
             ladder: LadderChoice::default(),
             combine: Combine::default(),
             uniform_share: None,
+            measure: Measure::default(),
             layers: false,
             mlt: MltSettings::default(),
             packet: PacketChoice::default(),
@@ -186,6 +190,7 @@ impl Settings {
             ladder: self.ladder.clone(),
             combine: self.combine,
             uniform_share: self.uniform_share,
+            measure: self.measure,
             layers: self.layers,
         }
     }

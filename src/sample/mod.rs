@@ -14,7 +14,6 @@ mod strata;
 pub use mutation::StepLaw;
 pub use points::Points;
 pub use proposals::{Move, Proposals};
-pub use sobol::LOW_DISCREPANCY_BLOCKS;
 pub use strata::{PixelOrder, StratifiedPoints};
 
 /// Four primary dimensions.

@@ -1,17 +1,18 @@
 //! Ladders side by side: what one thread works on at a time.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use rayon::prelude::*;
 
 use super::{
-    Canvas, Histogram, Round, RungCounts, Tally,
+    Canvas, Histogram, Round, RungCounts, Sum, Tally,
     ladder::swap_acceptance,
-    steps::{self, SCALES},
+    probes::TRIALS,
+    steps::{self, SCALES, StepMix},
     trips::{IndexProcess, Trips},
 };
 use crate::{
-    chain::{Evaluator, Start, Target, Walkers, replay},
+    chain::{Evaluator, Importance, Start, Target, Walkers, replay},
     path::Contribution,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
@@ -27,6 +28,7 @@ use crate::{
 /// a batch each: one where ladders are short, several where a ladder is longer than a batch. Parts explore side by side,
 /// also on several threads; swaps go between them.
 pub struct Block<W> {
+    number: usize,
     first_ladder: u32,
     ladders: usize,
     /// Replicas of a ladder that move, K − 1.
@@ -61,11 +63,11 @@ struct Part<W> {
 }
 
 impl<W: Default + Send> Block<W> {
-    /// Ladders `first_ladder`, `first_ladder + 1`, … of `rungs` ≥ 2, all without states, with `offers` ≥ 1 a sweep, in
-    /// parts of at most `lanes_a_part`.
+    /// Block number `number` of `ladders` ladders with `rungs` ≥ 2, all without states, with `offers` ≥ 1 a sweep, in parts
+    /// of at most `lanes_a_part`.
     pub fn new(
         rng: Rng,
-        (first_ladder, ladders): (u32, usize),
+        (number, ladders): (usize, usize),
         rungs: usize,
         offers: usize,
         lanes_a_part: usize,
@@ -74,7 +76,9 @@ impl<W: Default + Send> Block<W> {
     ) -> Block<W> {
         let chains = rungs - 1;
         let replicas = ladders * chains;
+        let first_ladder = (number * ladders) as u32;
         let mut block = Block {
+            number,
             first_ladder,
             ladders,
             chains,
@@ -121,7 +125,8 @@ impl<W: Default + Send> Block<W> {
         for number in 0..parts {
             let start = number * self.lanes_a_part;
             let range = start..(start + self.lanes_a_part).min(lanes);
-            let evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
+            let mut evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
+            evaluator.importance = self.parts[0].evaluator.importance.clone();
             match self.parts.get_mut(number) {
                 Some(part) => (part.lanes, part.evaluator) = (range, evaluator),
                 None => self.parts.push(Part {
@@ -154,6 +159,11 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
+    /// The way to move that the block tries: neighbouring blocks are halves of one trial.
+    pub fn trial(&self) -> usize {
+        self.number / 2 % TRIALS
+    }
+
     /// Evaluations of a sweep.
     pub fn lanes(&self) -> usize {
         self.ladders * (self.chains + self.offers)
@@ -162,6 +172,11 @@ impl<W: Default + Send> Block<W> {
     /// Part of a lane, and its place there.
     fn place(&self, lane: usize) -> (usize, usize) {
         (lane / self.lanes_a_part, lane % self.lanes_a_part)
+    }
+
+    /// Scalar contributions are weighed by this importance, if there is any; from before the first state on.
+    pub fn set_importance(&mut self, importance: Option<&Arc<Importance>>) {
+        self.parts.iter_mut().for_each(|part| part.evaluator.importance = importance.cloned());
     }
 
     /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block.
@@ -182,8 +197,8 @@ impl<W: Default + Send> Block<W> {
     pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, canvas: &Canvas, round: &Round) {
         let bank = steps::bank();
         for _ in 0..sweeps {
-            let (rung, sweep) = (&self.rung, self.sweeps);
-            let explore = |part: &mut Part<W>| part.explore(target, canvas, round, &bank, rung, sweep);
+            let (rung, sweep, mixes) = (&self.rung, self.sweeps, &round.mixes[self.trial()]);
+            let explore = |part: &mut Part<W>| part.explore(target, canvas, round, (&bank, mixes), rung, sweep);
             match &mut self.parts[..] {
                 [part] => explore(part),
                 parts => parts.par_iter_mut().for_each(explore),
@@ -279,9 +294,10 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
-    /// Puts what was splatted onto the film.
-    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
-        self.parts.iter_mut().for_each(|part| part.tally.deposit(canvas, block));
+    /// Puts what was splatted onto the film, and into a half and a trial of the probes.
+    pub fn deposit(&mut self, canvas: &Canvas) {
+        let (half, trial) = (self.number % 2, Some(self.trial()));
+        self.parts.iter_mut().for_each(|part| part.tally.deposit(canvas, half, trial));
     }
 
     /// Adds the histograms to those of the group, by rung.
@@ -297,6 +313,16 @@ impl<W: Default + Send> Block<W> {
         for part in &mut self.parts {
             part.tally.histograms[1..].fill(Histogram::default());
         }
+    }
+
+    /// What uniform points and tempered states added to the balanced image.
+    pub fn added(&self) -> [Sum; 2] {
+        let mut sums = [Sum::default(); 2];
+        for Part { tally, .. } in &self.parts {
+            sums[0].merge(tally.hot);
+            sums[1].merge(tally.tempered);
+        }
+        sums
     }
 
     /// Adds the round's counts, by rung.
@@ -346,7 +372,7 @@ impl<W: Default> Part<W> {
         target: &T,
         canvas: &Canvas,
         round: &Round,
-        bank: &[StepLaw; SCALES],
+        (bank, mixes): (&[StepLaw; SCALES], &[StepMix]),
         rung: &[u16],
         sweep: u64,
     ) {
@@ -358,7 +384,7 @@ impl<W: Default> Part<W> {
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
             let [decision, choice, ..] = rng.words(counter, 0);
             self.decision[at] = decision;
-            self.scale[at] = round.mixes[k].pick(open_unit_f64(choice)) as u8;
+            self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
             self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);
         }
         self.evaluator.evaluate(target, &self.walkers.points);
@@ -380,7 +406,7 @@ impl<W: Default> Part<W> {
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
         for point in &evaluator.out.lanes[self.replicas..] {
-            tally.uniform_point(canvas, round, point);
+            tally.uniform_point(canvas, round, point, false);
         }
     }
 }

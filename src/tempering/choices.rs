@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::chain::Measure;
+
 /// The rungs of the ladders.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -71,6 +73,8 @@ pub struct Choices {
     pub combine: Combine,
     /// Share of evaluations that are uniform points, 0 < share < 1; tuned where absent.
     pub uniform_share: Option<f64>,
+    /// The error that weights, shares and chains are to make small.
+    pub measure: Measure,
     /// Keep E_u, E_e and every rung's part of the image.
     pub layers: bool,
 }

@@ -1,12 +1,19 @@
 //! Probes: a part of the pixels where the image is made several times over, to learn which weights serve it best.
 //!
-//! Independent halves of the ladders fill separate films, so the difference of the halves shows the error of the image
-//! as it is, correlations of chains and evenness of pixels included.
+//! Separate halves of the samples fill separate films, so the difference of the halves shows the error of the image as it
+//! is, correlations of chains and evenness of points included. Ladders are halved by blocks, stratified points by time:
+//! halves of a sequence of low discrepancy that follow one another are as even as the whole.
 
 use crate::film::{Accumulator, Splat, Splats};
 
 /// What a chain state may count for beside a uniform point, ρ, from 0 (path tracing) on.
 pub const RATIOS: [f64; 8] = [0.0, 1.0 / 1024.0, 1.0 / 256.0, 1.0 / 64.0, 1.0 / 16.0, 1.0 / 4.0, 1.0, 4.0];
+
+/// The ratio of the most evenly weighed image, 1.
+pub const EVEN: usize = RATIOS.len() - 2;
+
+/// Ways to move that are tried side by side, on a third of the ladders each.
+pub const TRIALS: usize = 3;
 
 /// Pixels that are probed, at most.
 const MOST_PROBES: usize = 1 << 14;
@@ -54,12 +61,14 @@ impl ProbeMap {
 /// Luminance gathered by the probes in each half of the blocks, one layer for each of [`RATIOS`].
 pub struct Probes {
     halves: [Accumulator; 2],
+    trials: [[Accumulator; 2]; TRIALS],
 }
 
 impl Probes {
     /// Empty probes; `unit` as for the film.
     pub fn new(map: &ProbeMap, unit: f64) -> Probes {
-        Probes { halves: [(); 2].map(|()| Accumulator::new(map.len() as u32, 1, RATIOS.len(), unit)) }
+        let film = |layers: usize| [(); 2].map(|()| Accumulator::new(map.len() as u32, 1, layers, unit));
+        Probes { halves: film(RATIOS.len()), trials: [(); TRIALS].map(|()| film(1)) }
     }
 
     /// Splats for [`deposit`](Self::deposit).
@@ -75,23 +84,37 @@ impl Probes {
         }
     }
 
-    /// What a state of a chain adds for each ratio but 0, with its expected weight in `value`.
+    /// What a state of a chain of expected weight `weight` adds for each ratio but 0, were its weight one.
     #[inline(always)]
-    pub fn tempered(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64) {
+    pub fn tempered(splats: &mut Splats, probe: u32, weight: f64, value: impl Fn(f64) -> f64) {
         for (layer, ratio) in RATIOS.into_iter().enumerate().skip(1) {
-            splats.push(layer, Splat { pixel: probe, rgb: [0.0, value(ratio) as f32, 0.0], weight: 0.0 });
+            let value = value(ratio);
+            let rgb = [0.0, weight * value, weight * value * value].map(|v| v as f32);
+            splats.push(layer, Splat { pixel: probe, rgb, weight: 0.0 });
         }
     }
 
-    /// Adds the splats of block number `block`.
-    pub fn deposit(&self, block: usize, splats: &mut Splats) {
-        self.halves[block % 2].deposit(splats);
+    /// Adds splats to a half, and those of states to a trial as well, if they belong to one.
+    pub fn deposit(&self, half: usize, trial: Option<usize>, splats: &mut Splats) {
+        if let Some(trial) = trial {
+            let mut even = Splats::new(1);
+            splats.layer(EVEN).iter().for_each(|splat| even.push(0, *splat));
+            self.trials[trial][half].deposit(&mut even);
+        }
+        self.halves[half].deposit(splats);
     }
 
-    /// Σ over uniform points, Σ over states, and number of uniform points, of every probe in both halves.
-    pub fn sums(&self, ratio: usize) -> Vec<[[f64; 3]; 2]> {
+    /// Σ over the states of a trial in both halves of every probe, as they are weighed most evenly.
+    pub fn trial(&self, trial: usize) -> Vec<[f64; 2]> {
+        let [a, b] = [0, 1].map(|half: usize| self.trials[trial][half].layer(0));
+        a.into_iter().zip(b).map(|(a, b)| [a[1], b[1]]).collect()
+    }
+
+    /// Σ over uniform points, Σ over states, number of uniform points, and Σ of squares over states, of every probe in
+    /// both halves.
+    pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
         let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(ratio));
-        a.into_iter().zip(b).map(|(a, b)| [a, b].map(|[uniform, tempered, _, n]| [uniform, tempered, n])).collect()
+        a.into_iter().zip(b).map(|(a, b)| [a, b].map(|[uniform, tempered, squares, n]| [uniform, tempered, n, squares])).collect()
     }
 }
 

@@ -67,38 +67,49 @@ pub(super) fn from_fixed(sum: u64) -> f64 {
     sum as f64 / 1_048_576.0
 }
 
-/// Probabilities of the scales on one rung.
+/// Probabilities of the scales on one rung: a bell of scales about a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepMix {
     weights: [f64; SCALES],
 }
 
+/// The centre of Kelemen's sizes, 1/1024 to 1/64, in scales.
+pub const KELEMEN: f64 = 2.0;
+/// Standard deviation of the bell, in scales: about a centre of 2, some three quarters of the steps have Kelemen's sizes.
+const WIDTH: f64 = 0.75;
+/// Least weight of a scale, before all are scaled to sum to one: so all stay known.
+const TRIAL: f64 = 0.01;
+/// Steps from which an acceptance counts as known.
+const FEWEST: u64 = 256;
+
 impl StepMix {
-    /// Before anything is known: Kelemen's sizes, 1/1024 to 1/64, in equal shares (Kelemen et al. 2002).
-    pub fn kelemen() -> StepMix {
-        StepMix { weights: [0.0, 0.25, 0.5, 0.25, 0.0, 0.0].map(|w: f64| w.max(TRIAL)) }.normalised()
+    /// Weights ∝ exp(−(i − centre)²/(2 · 0.75²)) for scale i, none below 1 %; 0 ≤ centre ≤ 5 (others count as the nearest).
+    pub fn about(centre: f64) -> StepMix {
+        let centre = centre.clamp(0.0, (SCALES - 1) as f64);
+        let bell = |i: usize| libm::exp(-0.5 * ((i as f64 - centre) / WIDTH).powi(2));
+        let sum: f64 = (0..SCALES).map(bell).sum();
+        StepMix { weights: std::array::from_fn(|i| (bell(i) / sum).max(TRIAL)) }.normalised()
     }
 
-    /// The mix for acceptances that were measured on a rung, from the mix that they were measured with.
-    ///
-    /// Scales are weighed by how close their acceptance a is to the aim of 0.45: w ∝ exp(−(logit a − logit 0.45)²/2),
-    /// none below [`TRIAL`], so that all stay known. 0.45 and not the 0.234 of many independent dimensions: paths
-    /// have few dimensions that matter (ALGORITHM section 2; aiming at 0.234 cost up to twice the error on toys).
-    /// Scales with fewer than [`FEWEST`] steps keep their weight.
-    pub fn tuned(&self, counts: &[StepCount; SCALES]) -> StepMix {
-        if counts.iter().all(|count| count.proposed < FEWEST) {
-            return *self;
+    /// Centre on a rung with acceptances `here` that has the acceptance which `centre` has on the target, whose acceptances
+    /// are `target`: hotter rungs take longer steps. `centre` itself where too little is known.
+    pub fn centre_of_equal_acceptance(centre: f64, target: &[StepCount; SCALES], here: &[StepCount; SCALES]) -> f64 {
+        let known = |counts: &[StepCount; SCALES]| counts.iter().all(|count| count.proposed >= FEWEST);
+        if !known(target) || !known(here) {
+            return centre;
         }
-        let logit = |p: f64| libm::log(p / (1.0 - p));
-        let weights = std::array::from_fn(|i| {
-            if counts[i].proposed < FEWEST {
-                return self.weights[i];
+        let below = (centre.clamp(0.0, (SCALES - 1) as f64) as usize).min(SCALES - 2);
+        let [a, b] = [below, below + 1].map(|i| target[i].acceptance());
+        let wanted = a + (b - a) * (centre - below as f64);
+        // acceptance falls with the scale, but for noise: the first crossing from the centre on
+        for i in below..SCALES - 1 {
+            let [a, b] = [i, i + 1].map(|i| here[i].acceptance());
+            if b < wanted {
+                let place = i as f64 + if a > wanted { (a - wanted) / (a - b) } else { 0.0 };
+                return place.max(centre);
             }
-            let a = counts[i].acceptance().clamp(1e-4, 1.0 - 1e-4);
-            libm::exp(-0.5 * (logit(a) - logit(AIM)).powi(2))
-        });
-        let sum: f64 = weights.iter().sum();
-        StepMix { weights: weights.map(|w| (w / sum).max(TRIAL)) }.normalised()
+        }
+        (SCALES - 1) as f64
     }
 
     fn normalised(self) -> StepMix {
@@ -125,13 +136,6 @@ impl StepMix {
     }
 }
 
-/// Acceptance that scales aim at.
-const AIM: f64 = 0.45;
-/// Least weight of a scale, before all are scaled to sum to one.
-const TRIAL: f64 = 0.01;
-/// Steps from which an acceptance counts as known.
-const FEWEST: u64 = 64;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,21 +149,27 @@ mod tests {
     }
 
     #[test]
-    fn scales_near_the_aim_are_taken_most_and_none_is_forgotten() {
-        let mix = StepMix::kelemen().tuned(&counts([0.99, 0.95, 0.8, 0.45, 0.1, 0.001]));
-        let w = mix.weights();
-        assert!(w[3] > 0.4 && w.iter().all(|w| *w <= mix.weights()[3] && *w >= 0.5 * TRIAL), "{w:?}");
+    fn the_bell_has_kelemens_sizes_in_its_middle_and_forgets_no_scale() {
+        let w = *StepMix::about(KELEMEN).weights();
+        assert!(w[2] > 0.4 && (w[1] - w[3]).abs() < 1e-12 && w.iter().all(|w| *w > 0.5 * TRIAL), "{w:?}");
         assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
-    fn a_mix_is_kept_where_nothing_was_measured() {
-        assert_eq!(StepMix::kelemen().tuned(&[StepCount::default(); SCALES]), StepMix::kelemen());
+    fn hotter_rungs_take_steps_of_the_same_acceptance() {
+        let target = counts([0.9, 0.8, 0.6, 0.4, 0.2, 0.1]);
+        let hotter = counts([0.98, 0.95, 0.9, 0.7, 0.5, 0.3]);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &target), 2.0);
+        let centre = StepMix::centre_of_equal_acceptance(2.0, &target, &hotter);
+        assert!((centre - 3.5).abs() < 1e-5, "{centre}");
+        let all = counts([1.0; SCALES]);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &all), (SCALES - 1) as f64);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &[StepCount::default(); SCALES]), 2.0);
     }
 
     #[test]
     fn scales_are_picked_as_often_as_their_weights_say() {
-        let mix = StepMix::kelemen();
+        let mix = StepMix::about(KELEMEN);
         let mut picked = [0.0; SCALES];
         for i in 0..100_000 {
             picked[mix.pick((f64::from(i) + 0.5) / 1e5)] += 1e-5;

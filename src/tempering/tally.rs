@@ -1,8 +1,11 @@
 //! What one thread records while it works: statistics, splats, probes. Sums are of integers or kept in lists, so
 //! nothing depends on how work was cut up.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use super::{
     Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
+    probes::TRIALS,
     steps::{SCALES, StepCount},
 };
 use crate::{
@@ -61,10 +64,86 @@ pub struct Canvas<'a> {
     pub size: [u32; 2],
     /// The film.
     pub film: &'a Accumulator,
+    /// Typical magnitude of the brightest f.
+    pub unit: f64,
     /// What its layers hold.
     pub layers: Layers,
     /// Probes, while there is something to learn.
     pub probes: Option<(&'a ProbeMap, &'a Probes)>,
+    /// Where stratified points are counted.
+    pub groups: &'a PointGroups,
+}
+
+/// ln g of stratified points in groups that may be taken as independent. Histograms are exact, so it does not matter who
+/// adds to them when.
+pub struct PointGroups(Vec<Mutex<Seen>>);
+
+/// Stratified points of one group.
+#[derive(Clone, Debug, Default)]
+struct Seen {
+    histogram: Histogram,
+    hot: Sum,
+}
+
+/// Σ of luminances that went to the balanced image, in units of 2⁻⁶⁰ of the film's, and Σ of weights that went with
+/// them, in units of 2⁻²⁰: integers, which do not depend on the order of addition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sum {
+    luminance: i128,
+    weight: u128,
+}
+
+impl Sum {
+    #[inline(always)]
+    fn add(&mut self, luminance: f64, weight: f64) {
+        self.luminance = self.luminance.saturating_add((luminance * 1_152_921_504_606_846_976.0) as i128);
+        self.weight += (weight * 1_048_576.0 + 0.5) as u128;
+    }
+
+    /// Adds another sum.
+    pub fn merge(&mut self, other: Sum) {
+        self.luminance = self.luminance.saturating_add(other.luminance);
+        self.weight += other.weight;
+    }
+
+    /// Luminance, in the film's unit, and weight.
+    pub fn values(self) -> (f64, f64) {
+        (self.luminance as f64 / 1_152_921_504_606_846_976.0, self.weight as f64 / 1_048_576.0)
+    }
+}
+
+impl PointGroups {
+    /// So many groups, all empty.
+    pub fn new(groups: usize) -> PointGroups {
+        PointGroups((0..groups).map(|_| Mutex::default()).collect())
+    }
+
+    /// Adds to a group what a tally has seen of the uniform rung, which forgets it.
+    pub fn take(&self, group: usize, tally: &mut Tally) {
+        let mut seen = self.locked(group);
+        seen.histogram.merge(&std::mem::take(&mut tally.histograms[0]));
+        seen.hot.merge(std::mem::take(&mut tally.hot));
+    }
+
+    /// Adds a group's points to `sum`.
+    pub fn add_to(&self, group: usize, sum: &mut Histogram) {
+        sum.merge(&self.locked(group).histogram);
+    }
+
+    /// What a group's points added to the balanced image.
+    pub fn hot(&self, group: usize) -> Sum {
+        self.locked(group).hot
+    }
+
+    /// Forgets ln g, which is about to mean something else.
+    pub fn forget_histograms(&self) {
+        (0..self.0.len()).for_each(|group| self.locked(group).histogram = Histogram::default());
+    }
+
+    /// The group, even if another thread panicked with it in hand.
+    fn locked(&self, group: usize) -> MutexGuard<'_, Seen> {
+        self.0[group].lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Canvas<'_> {
@@ -87,11 +166,13 @@ pub struct Round {
     pub ladder: Ladder,
     /// How samples enter the image.
     pub weights: Weights,
-    /// How chains move, by rung; the first entry is unused.
-    pub mixes: Vec<StepMix>,
+    /// How chains move, by trial and rung; the first rung is unused.
+    pub mixes: [Vec<StepMix>; TRIALS],
     /// Weight on the film of a uniform point and of a state, by which rounds count in proportion to their length
     /// whatever their share of uniform points is.
     pub effort: [f64; 2],
+    /// All uniform points are offered ones.
+    pub only_offers: bool,
     /// Sweep of the ladders at which the second half of the round begins.
     pub half: u64,
 }
@@ -132,6 +213,10 @@ pub struct Tally {
     /// Splats not yet on the film.
     pub splats: Splats,
     probes: Splats,
+    /// What uniform points added to the balanced image, since ever or since it was taken.
+    pub hot: Sum,
+    /// The same of tempered states, since ever.
+    pub tempered: Sum,
 }
 
 impl Tally {
@@ -142,12 +227,15 @@ impl Tally {
             counts: vec![RungCounts::default(); rungs],
             splats: Splats::new(layers),
             probes: Probes::splats(),
+            hot: Sum::default(),
+            tempered: Sum::default(),
         }
     }
 
-    /// Records an independent sample; the film counts dark ones too.
+    /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind, where there
+    /// are any: offered ones are noisier.
     #[inline(always)]
-    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution) {
+    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution, stratified: bool) {
         self.histograms[0].add(point.ln_g, 1.0);
         let mixture = if point.is_dark() { 0.0 } else { round.weights.mixture(point.ln_g) };
         let size = canvas.size.map(|n| n as f32);
@@ -159,10 +247,11 @@ impl Tally {
             let [effort, _] = round.effort;
             let share = effort * round.weights.uniform(mixture);
             recorder.splat(layer, point, share, effort);
-            self.counts[0].luminance += share * point.g();
+            self.counts[0].luminance += share * point.luminance();
+            self.hot.add(share * point.luminance() / canvas.unit, effort);
         }
-        if let Some(probe) = canvas.probe(point) {
-            let g = point.g();
+        if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
+            let g = point.luminance();
             Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
         }
     }
@@ -184,18 +273,19 @@ impl Tally {
         if let Some(first) = canvas.layers.rungs {
             recorder.splat(first + k - 1, state, value, effort * weight);
         }
-        self.counts[k].luminance += value * state.g();
+        self.counts[k].luminance += value * state.luminance();
+        self.tempered.add(value * state.luminance() / canvas.unit, effort * weight);
         if let Some(probe) = canvas.probe(state) {
-            let g = state.g() * weight;
-            Probes::tempered(&mut self.probes, probe, |ratio| g * round.weights.tempered_with(ratio, mixture));
+            let g = state.luminance();
+            Probes::tempered(&mut self.probes, probe, weight, |ratio| g * round.weights.tempered_with(ratio, mixture));
         }
     }
 
-    /// Puts what was splatted onto the film; `block` is the number of the block that it came from.
-    pub fn deposit(&mut self, canvas: &Canvas, block: usize) {
+    /// Puts what was splatted onto the film, and into that half and trial of the probes.
+    pub fn deposit(&mut self, canvas: &Canvas, half: usize, trial: Option<usize>) {
         canvas.film.deposit(&mut self.splats);
         match canvas.probes {
-            Some((_, probes)) => probes.deposit(block, &mut self.probes),
+            Some((_, probes)) => probes.deposit(half, trial, &mut self.probes),
             None => self.probes.clear(),
         }
     }

@@ -35,7 +35,7 @@ pub fn pssmlt<T: Target>(
         batch.evaluate(target, &Points::new(0));
         let lit = batch.out.lanes[..lanes].iter().zip(&batch.counters);
         samples.extend(lit.map(|(c, counter)| Start { counter: *counter, ln_g: c.ln_g }));
-        first_sum += batch.out.lanes[..lanes].iter().map(Contribution::g).sum::<f64>();
+        first_sum += batch.out.lanes[..lanes].iter().map(Contribution::luminance).sum::<f64>();
     }
     let two_pass = first_sum / bootstrap as f64;
 

@@ -20,18 +20,19 @@ impl<W: Default + Send> Sampler<W> {
     /// The picture so far, states included that have not been recorded yet; changes nothing.
     pub fn develop(&self) -> Development {
         let mut pending = Tally::new(self.round.ladder.rungs(), self.screen.layers.count);
-        let mut groups: Vec<Vec<Histogram>> = Vec::with_capacity(self.portions.len());
+        let (mut groups, mut sums) = (Vec::new(), Vec::new());
         let canvas = self.screen.canvas();
-        for portion in &self.portions {
-            let mut group = self.group(portion);
+        for (number, portion) in self.portions.iter().enumerate() {
+            let mut group = self.group(number);
             if let Some(block) = &portion.ladders {
                 pending.histograms.fill(Histogram::default());
                 block.pending(&canvas, &self.round, &mut pending);
                 group.iter_mut().zip(&pending.histograms).for_each(|(sum, h)| sum.merge(h));
             }
             groups.push(group);
+            sums.push(std::mem::take(&mut pending.tempered));
         }
-        let learnt = Learnt::of(&self.round.ladder, &groups);
+        let learnt = self.learnt(&groups, &sums);
         let planes = Planes { sampler: self, pending: &pending.splats, learnt: &learnt };
         let combine = self.choices.combine;
         let image = match combine {

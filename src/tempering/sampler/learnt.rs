@@ -10,18 +10,23 @@ pub struct Learnt {
     pub uniform: Estimate,
     /// c along the ladder, rung by rung.
     pub stepping_stones: Estimate,
+    /// Mean luminance of the balanced image.
+    pub luminance: Estimate,
     /// How g is spread over the cube.
     pub density: DensityOfStates,
 }
 
 impl Learnt {
-    pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>]) -> Learnt {
+    /// From the histograms of independent groups, and the mean luminances that uniform points and tempered states add to
+    /// the balanced image, the latter in units of e^`ln_unit`.
+    pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>], [hot, tempered]: [Estimate; 2], ln_unit: f64) -> Learnt {
         let groups: Vec<&[Histogram]> = groups.iter().map(Vec::as_slice).collect();
         let normalisers = Normalisers::solve(ladder, &groups);
         Learnt {
             uniform: uniform_mean(&groups),
             stepping_stones: stepping_stones(ladder.betas(), &groups),
             density: DensityOfStates::new(ladder, &groups, &normalisers),
+            luminance: mean_luminance(hot, tempered, &normalisers.target, ln_unit),
             normalisers,
         }
     }
@@ -33,9 +38,22 @@ impl Learnt {
             return Vec::new();
         }
         vec![format!(
-            "the uniform replica alone estimates a mean luminance of {:.4} ± {:.4}, all replicas together {:.4} ± {:.4}: \
-             chains may not find all of the light; render longer or compare with --method path",
-            uniform.value, uniform.standard_error, mbar.value, mbar.standard_error
+            "the uniform replica alone estimates ln c = {:.4} ± {:.4}, all replicas together {:.4} ± {:.4}: chains may not \
+             find all of the light; render longer or compare with --method path",
+            uniform.ln_value, uniform.relative_error, mbar.ln_value, mbar.relative_error
         )]
     }
+}
+
+/// hot + Ẑ · tempered. The errors of the first and of Ẑ come from the same uniform points and are added, which is more
+/// than they can be; that of the states is independent of them as far as chains forget their starts.
+fn mean_luminance(hot: Estimate, tempered: Estimate, target: &Estimate, ln_unit: f64) -> Estimate {
+    if tempered.value == 0.0 {
+        return hot;
+    }
+    let scale = libm::exp(target.ln_value - ln_unit);
+    let states = tempered.value * scale;
+    let value = hot.value + states;
+    let shared = hot.standard_error + states * target.relative_error;
+    Estimate::from_ln(libm::log(value), shared.hypot(tempered.standard_error * scale) / value)
 }

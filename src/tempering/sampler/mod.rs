@@ -11,22 +11,25 @@ mod learnt;
 mod reporting;
 mod rounds;
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 pub use development::Development;
 pub use learnt::Learnt;
 
 use super::{
-    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, ProbeMap, Probes, Round, RoundReport,
-    StepMix, Tally, Weights, independent::Independent, steps::StepCount, tuning::Choice,
+    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport, Sum,
+    Tally, Weights, independent::Independent, probes::TRIALS, steps::{self, StepCount}, tuning::Choice,
 };
 use crate::{
-    chain::{Plan, Start, Target},
+    chain::{Importance, Measure, Plan, Start, Target},
     film::{Accumulator, Footprint},
     rng::Rng,
 };
 
-/// Uniform points before chains start; a sixteenth of the run where that is less.
+/// Uniform points before chains start, and before that where it is to be learnt where chains are wanted; a 32nd of the
+/// run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
@@ -40,6 +43,8 @@ pub struct Sampler<W> {
     portions: Vec<Portion<W>>,
     round: Round,
     schedule: Schedule,
+    /// Where chains are wanted; absent where they follow the luminance itself, and before that is known.
+    importance: Option<Arc<Importance>>,
     /// Magnitude of c, fixed when chains start.
     ln_unit: f64,
     /// Points offered to a ladder each sweep.
@@ -47,6 +52,8 @@ pub struct Sampler<W> {
     ladders_a_block: usize,
     /// Weights and shares of the round.
     choice: Choice,
+    /// Centre of the sizes of steps on the target, in scales of the bank.
+    centre: f64,
     /// Rungs were moved for the next round.
     moved: bool,
     /// Rays of the ladders in this round, offered points included.
@@ -79,6 +86,7 @@ struct Screen {
     layers: Layers,
     map: ProbeMap,
     probes: Option<Probes>,
+    groups: PointGroups,
 }
 
 /// One block of ladders and one of independent points, with what they saw.
@@ -86,8 +94,9 @@ struct Portion<W> {
     uniform: Independent<W>,
     tally: Tally,
     ladders: Option<Block<W>>,
-    /// What ladders saw that are given up.
+    /// What ladders saw that are given up, and what they added to the image.
     past: Vec<Histogram>,
+    added: [Sum; 2],
     starts: Vec<Start>,
 }
 
@@ -147,17 +156,19 @@ impl<W: Default + Send> Sampler<W> {
             layers,
             probes: learns.then(|| Probes::new(&map, unit)),
             map,
+            groups: PointGroups::new(plan.blocks),
         };
         let portion = |number: usize| Portion {
             uniform: Independent::new(rng, (number, plan.blocks), size),
             tally: Tally::new(1, layers.count),
             ladders: None,
             past: Vec::new(),
+            added: [Sum::default(); 2],
             starts: Vec::new(),
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
         let only_uniform = most_rungs == 1;
-        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 16.0).div_ceil(a_sweep) };
+        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
         Sampler {
             rng,
             screen,
@@ -165,17 +176,20 @@ impl<W: Default + Send> Sampler<W> {
             round: Round {
                 ladder: Ladder::uniform(),
                 weights: Weights::uniform_alone(),
-                mixes: vec![StepMix::kelemen()],
+                mixes: [(); TRIALS].map(|()| Vec::new()),
                 effort: [1.0, 0.0],
+                only_offers: false,
                 half: u64::MAX,
             },
             schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },
             plan,
             choices,
+            importance: None,
             ln_unit: 0.0,
             offers: 0,
             ladders_a_block: 0,
             choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            centre: steps::KELEMEN,
             moved: false,
             ladder_rays: 0,
             image_correlation: None,
@@ -215,7 +229,8 @@ impl<W: Default + Send> Sampler<W> {
             if self.schedule.done == self.schedule.length {
                 self.end_round(target);
             }
-            let now = sweeps.min(self.schedule.length - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
+            let stop = if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
+            let now = sweeps.min(stop - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
             self.work(target, now);
             sweeps -= now;
         }
@@ -225,7 +240,8 @@ impl<W: Default + Send> Sampler<W> {
     fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
         let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
-        self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
+        let half = usize::from(schedule.done >= schedule.middle());
+        self.portions.par_iter_mut().for_each(|portion| {
             let canvas = screen.canvas();
             let Portion { uniform, tally, ladders, starts, .. } = portion;
             for _ in 0..sweeps {
@@ -239,9 +255,10 @@ impl<W: Default + Send> Sampler<W> {
                 };
                 uniform.sweep(target, schedule.points, &canvas, round, tally, keep);
             }
-            tally.deposit(&canvas, number);
+            uniform.settle(&canvas, tally);
+            tally.deposit(&canvas, half, None);
             if let Some(block) = ladders {
-                block.deposit(&canvas, number);
+                block.deposit(&canvas);
             }
         });
         for portion in &mut self.portions {
@@ -302,9 +319,21 @@ impl<W: Default + Send> Sampler<W> {
         (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
     }
 
+    /// Whether chains follow the luminance weighed by an importance: only the balanced image allows for that.
+    fn weighs(&self) -> bool {
+        self.choices.combine == Combine::Balance && self.choices.measure == Measure::Relative
+    }
+
     /// Reports of the rounds that ended since this was last asked for.
     pub fn take_reports(&mut self) -> Vec<RoundReport> {
         std::mem::take(&mut self.reports)
+    }
+}
+
+impl Schedule {
+    /// Sweep of the round at which its second half begins.
+    fn middle(&self) -> u64 {
+        self.length / 2
     }
 }
 
@@ -314,8 +343,10 @@ impl Screen {
             footprint: &self.footprint,
             size: self.size,
             film: &self.film,
+            unit: self.unit,
             layers: self.layers,
             probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
+            groups: &self.groups,
         }
     }
 }

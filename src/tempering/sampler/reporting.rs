@@ -3,7 +3,7 @@
 use super::{Learnt, Sampler};
 use crate::tempering::{
     Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport, steps,
-    trips::Dwell,
+    probes::TRIALS, trips::Dwell,
 };
 
 /// β at which the local barrier is told.
@@ -87,8 +87,8 @@ impl<W: Default + Send> Sampler<W> {
 
     fn rung_reports(&self, learnt: &Learnt, counts: &[RungCounts]) -> Vec<RungReport> {
         let mut seen = vec![crate::tempering::Histogram::default(); self.round.ladder.rungs()];
-        for portion in &self.portions {
-            seen.iter_mut().zip(&self.group(portion)).for_each(|(sum, h)| sum.merge(h));
+        for number in 0..self.portions.len() {
+            seen.iter_mut().zip(&self.group(number)).for_each(|(sum, h)| sum.merge(h));
         }
         // tempered luminance is in units of the weights, whose normalisers are only now known
         let scale = libm::exp(learnt.normalisers.target.ln_value - self.ln_unit);
@@ -125,7 +125,7 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     fn scale_reports(&self, k: usize, counts: &RungCounts) -> Vec<ScaleReport> {
-        let weights = self.round.mixes[k].weights();
+        let weights = self.round.mixes[TRIALS / 2][k].weights();
         let report = |i: usize| ScaleReport {
             size: steps::size(i),
             weight: weights[i],

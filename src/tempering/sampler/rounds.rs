@@ -1,14 +1,18 @@
 //! Ends of rounds: what was learnt, and what follows from it.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::{Learnt, MOST_AUTOMATIC, Portion, Sampler, at_most};
+use super::{Learnt, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
-    chain::{Start, Target, resample},
+    chain::{Importance, Start, Target, resample},
+    scene::Rgb,
     tempering::{
-        Block, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Weights,
+        Block, Estimate, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Sum, Weights,
         placement::rungs,
-        probes::RATIOS,
+        probes::{RATIOS, TRIALS},
+        steps,
         tuning::{Choice, Measured},
     },
 };
@@ -30,6 +34,16 @@ const OFFERS_TAKEN: f64 = 0.5;
 /// What an evaluation costs beside its rays, in rays: random numbers, shading, recording (benches/mutations.rs: half of
 /// the time of paths with some eight rays is spent outside Embree).
 const COST_BESIDE_RAYS: f64 = 6.0;
+/// The trial of steps as they are; the ones beside it take shorter and longer ones.
+const UNSHIFTED: usize = TRIALS / 2;
+/// Noise, by that of steps as they are, from which on others are taken.
+const CLEARLY_LESS: f64 = 0.95;
+
+/// Scales by which a trial's steps are shifted.
+fn shift(trial: usize) -> f64 {
+    0.75 * (trial as f64 - UNSHIFTED as f64)
+}
+
 /// What a state counts for in the first round, before that is measured.
 const FIRST_RATIO: f64 = 0.25;
 /// Share of uniform points, at least, and at most where chains are asked for.
@@ -41,11 +55,16 @@ impl<W: Default + Send> Sampler<W> {
     pub(super) fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
         self.flush();
         let learnt = self.learn();
+        self.image_correlation = self.measured(&learnt).and_then(|measured| measured.correlation());
         let mut report = self.report(&learnt);
         let choices = match (self.schedule.round, learnt.normalisers.target.ln_value.is_finite()) {
             // nothing lit yet: nothing to start chains from, nothing else to do but to go on
             (0, false) => {
                 self.schedule.length *= 2;
+                return;
+            }
+            (0, true) if self.weighs() && self.importance.is_none() => {
+                self.weigh();
                 return;
             }
             (0, true) => self.raise_ladders(target, &learnt),
@@ -58,27 +77,64 @@ impl<W: Default + Send> Sampler<W> {
         self.begin_round(&learnt);
     }
 
+    /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
+    fn weigh(&mut self) {
+        let layer = self.screen.layers.hot.expect("a balanced image");
+        let luminance = |[r, g, b, points]: [f64; 4]| {
+            let rgb = Rgb::new(r as f32, g as f32, b as f32);
+            [f64::from(crate::path::luminance(rgb)), points]
+        };
+        let found: Vec<[f64; 2]> = self.screen.film.layer(layer).into_iter().map(luminance).collect();
+        let importance = Arc::new(Importance::new(self.screen.size, &found));
+        for portion in &mut self.portions {
+            portion.uniform.set_importance(&importance);
+            portion.starts.clear();
+        }
+        self.importance = Some(importance);
+        self.screen.groups.forget_histograms();
+        self.schedule.length += self.schedule.done;
+    }
+
     /// Records what states have gathered; the round's settings still hold.
     fn flush(&mut self) {
         let (screen, round) = (&self.screen, &self.round);
-        self.portions.par_iter_mut().enumerate().for_each(|(number, portion)| {
+        self.portions.par_iter_mut().for_each(|portion| {
             if let Some(block) = &mut portion.ladders {
                 block.flush(&screen.canvas(), round);
-                block.deposit(&screen.canvas(), number);
+                block.deposit(&screen.canvas());
             }
         });
     }
 
     /// What all that is recorded says.
     fn learn(&self) -> Learnt {
-        let groups: Vec<Vec<Histogram>> = self.portions.iter().map(|portion| self.group(portion)).collect();
-        Learnt::of(&self.round.ladder, &groups)
+        let groups: Vec<Vec<Histogram>> = (0..self.portions.len()).map(|number| self.group(number)).collect();
+        self.learnt(&groups, &[])
     }
 
-    /// A portion's histograms by rung.
-    pub(super) fn group(&self, portion: &Portion<W>) -> Vec<Histogram> {
+    /// What groups of histograms say; `pending` is what each block's states would add to the balanced image.
+    pub(super) fn learnt(&self, groups: &[Vec<Histogram>], pending: &[Sum]) -> Learnt {
+        let (mut hot, mut tempered) = (Vec::new(), Vec::new());
+        for (number, portion) in self.portions.iter().enumerate() {
+            let [mut points, mut states] = portion.ladders.as_ref().map_or(portion.added, Block::added);
+            points.merge(self.screen.groups.hot(number));
+            pending.get(number).into_iter().for_each(|sum| states.merge(*sum));
+            hot.push(points.values());
+            // each block's states stand for as much of the image as any other's
+            tempered.push((states.values().0, self.effort / self.portions.len() as f64));
+        }
+        let parts = [hot, tempered].map(|sums| {
+            let sums: Vec<(f64, f64)> = sums.into_iter().map(|(s, n)| (s * self.screen.unit, n)).collect();
+            Estimate::from_sums(&sums)
+        });
+        Learnt::of(&self.round.ladder, groups, parts, self.ln_unit)
+    }
+
+    /// Histograms by rung of group `number`: what block `number` of the ladders saw, and stratified points.
+    pub(super) fn group(&self, number: usize) -> Vec<Histogram> {
+        let portion = &self.portions[number];
         let mut group = vec![Histogram::default(); self.round.ladder.rungs()];
-        group[0].merge(&portion.tally.histograms[0]);
+        self.screen.groups.add_to(number, &mut group[0]);
         group.iter_mut().zip(&portion.past).for_each(|(sum, past)| sum.merge(past));
         if let Some(block) = &portion.ladders {
             block.add_histograms(&mut group);
@@ -98,7 +154,7 @@ impl<W: Default + Send> Sampler<W> {
         let ladder = &self.round.ladder;
         let chains = ladder.chains();
         self.ln_unit = learnt.normalisers.target.ln_value;
-        self.offers = chains;
+        self.offers = 1;
         let remaining = self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations));
         let ladders = self.plan.groups_a_block(remaining, 2 * chains);
         let samples: Vec<Start> = self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
@@ -109,17 +165,22 @@ impl<W: Default + Send> Sampler<W> {
             .map(|(rung, &beta)| resample(&samples, beta, all, self.rng, rung as u32))
             .collect();
         let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.offers, self.screen.size);
+        let importance = self.importance.as_ref();
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
             let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
-            let mut block = Block::new(rng, (first as u32, ladders), chains + 1, offers, LANES_A_PART, layers, size);
+            let mut block = Block::new(rng, (i, ladders), chains + 1, offers, LANES_A_PART, layers, size);
+            block.set_importance(importance);
             block.start(target, &starts);
             portion.ladders = Some(block);
         });
         self.ladders_a_block = ladders;
         self.rays_a_point = self.rays as f64 / self.evaluations as f64;
-        self.round.mixes = vec![StepMix::kelemen(); chains + 1];
-        self.choice = Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
+        self.choice = Choice {
+            ratio: FIRST_RATIO,
+            share: self.choices.uniform_share.unwrap_or(0.5),
+            relative_error: f64::NAN,
+        };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
             LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
@@ -134,9 +195,7 @@ impl<W: Default + Send> Sampler<W> {
         let last = self.is_last_lesson();
         let choice = self.tune(learnt, last);
         let counts = self.counts_by_rung();
-        for (mix, counts) in self.round.mixes.iter_mut().zip(&counts).skip(1) {
-            *mix = mix.tuned(&counts.steps);
-        }
+        said.extend(self.choose_steps(learnt));
         if !last && !matches!(self.choices.ladder, LadderChoice::Betas(_)) {
             said.extend(self.place_anew(learnt));
         }
@@ -167,6 +226,38 @@ impl<W: Default + Send> Sampler<W> {
         said
     }
 
+    /// Shifts the sizes of steps where the trials show that this pays.
+    fn choose_steps(&mut self, learnt: &Learnt) -> Option<String> {
+        let (probes, measured) = (self.screen.probes.as_ref()?, self.measured(learnt)?);
+        let blocks = |trial| self.portions.iter().flat_map(|p| &p.ladders).filter(|block| block.trial() == trial).count();
+        // a sum of n blocks has √n times the noise of one
+        let noise: [f64; TRIALS] =
+            std::array::from_fn(|trial| measured.noise(&probes.trial(trial)) / (blocks(trial) as f64).sqrt());
+        let best = (0..TRIALS).min_by(|a, b| noise[*a].total_cmp(&noise[*b]))?;
+        if noise[best] > CLEARLY_LESS * noise[UNSHIFTED] {
+            return None;
+        }
+        self.centre = (self.centre + shift(best)).clamp(0.0, (steps::SCALES - 1) as f64);
+        Some(format!(
+            "{} steps, of about 2^{:.0}: {:.2} times the noise",
+            if best < UNSHIFTED { "shorter" } else { "longer" },
+            2.0 * self.centre - 12.0,
+            noise[best] / noise[UNSHIFTED]
+        ))
+    }
+
+    /// The mixes of step sizes for the trials of the next round; all the same once settings are frozen.
+    fn mixes(&self, counts: &[RungCounts]) -> [Vec<StepMix>; TRIALS] {
+        let target = &counts[counts.len() - 1].steps;
+        std::array::from_fn(|trial| {
+            let centre = self.centre + if self.schedule.frozen { 0.0 } else { shift(trial) };
+            let of_rung = |counts: &RungCounts| {
+                StepMix::about(StepMix::centre_of_equal_acceptance(centre, target, &counts.steps))
+            };
+            counts.iter().map(of_rung).collect()
+        })
+    }
+
     /// Uniform points a sweep for each ladder of `chains` chains, by the share that is chosen.
     fn uniform_a_ladder(&self, chains: usize) -> f64 {
         chains as f64 * self.choice.share / (1.0 - self.choice.share)
@@ -180,33 +271,33 @@ impl<W: Default + Send> Sampler<W> {
 
     /// The weights and the share that serve best, where they are free.
     fn tune(&self, learnt: &Learnt, last: bool) -> Option<Choice> {
-        let probes = self.screen.probes.as_ref()?;
-        let free = self.choices.ladder == LadderChoice::Auto;
         // while chains are to show what they can do they keep a part of the work, less in each round
-        let most = match (free, last) {
+        let most = match (self.choices.ladder == LadderChoice::Auto, last) {
             (true, true) => 1.0,
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
             _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
         };
         let shares = self.choices.uniform_share.map_or(LEAST_UNIFORM..=most, |share| share..=share);
+        self.measured(learnt).map(|measured| measured.choose(&shares))
+    }
+
+    /// What the round has measured, if it has.
+    fn measured(&self, learnt: &Learnt) -> Option<Measured> {
+        let probes = self.screen.probes.as_ref()?;
         let states = (self.schedule.done * self.ladders()) as f64;
-        let points = (self.schedule.done as usize * self.portions.len() * self.points_a_block()) as f64;
         let chains = self.round.ladder.chains() as f64;
         let pixels = f64::from(self.screen.size[0]) * f64::from(self.screen.size[1]);
         let target = learnt.normalisers.target;
-        let scale = pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states);
-        let measured = Measured {
+        Some(Measured {
             probes: (0..RATIOS.len()).map(|ratio| probes.sums(ratio)).collect(),
             pixels,
-            points,
             states: chains * states,
-            tempered_scale: [scale; 2],
+            tempered_scale: pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states),
             normaliser_variance: target.relative_error.powi(2),
-            mean: target.value,
+            measure: self.choices.measure,
+            mean: learnt.luminance.value,
             cost: self.costs(chains * states),
-            shares: &shares,
-        };
-        Some(measured.choose())
+        })
     }
 
     /// Cost of a uniform point and of a step of a chain, in rays.
@@ -243,6 +334,7 @@ impl<W: Default + Send> Sampler<W> {
                 let mut past = vec![Histogram::default(); self.round.ladder.rungs()];
                 block.add_histograms(&mut past);
                 portion.past = past;
+                portion.added = block.added();
             }
         }
     }
@@ -257,6 +349,7 @@ impl<W: Default + Send> Sampler<W> {
             let uniform = self.uniform_a_ladder(self.round.ladder.chains()) * self.ladders_a_block as f64;
             self.schedule.points = (uniform.round() as usize).saturating_sub(self.offers * self.ladders_a_block);
             self.round.weights = Weights::new(&self.round.ladder, &ln_zeta, self.choice.ratio, self.ln_unit);
+            self.round.mixes = self.mixes(&self.counts_by_rung());
         } else {
             self.schedule.points = self.plan.lanes();
             self.round.weights = Weights::uniform_alone();
@@ -292,7 +385,8 @@ impl<W: Default + Send> Sampler<W> {
         self.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
         self.schedule.done = 0;
         let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
-        self.round.half = sweeps + self.schedule.length / 2;
+        self.round.only_offers = self.schedule.points == 0;
+        self.round.half = sweeps + self.schedule.middle();
     }
 
     /// Uniform points of a block in a sweep, offered or not.
