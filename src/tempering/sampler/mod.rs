@@ -108,6 +108,8 @@ struct Schedule {
     /// Sweeps of the round, and those done.
     length: u64,
     done: u64,
+    /// Sweeps of the ladders in a sweep of the run, so many that independent points come in batches.
+    ladder_sweeps: u64,
     /// Independent points of a block in each sweep, beside its ladders.
     points: usize,
     /// Evaluations that the round was planned for.
@@ -219,7 +221,7 @@ impl<W: Default + Send> Sampler<W> {
     /// Evaluations of a sweep.
     fn a_sweep(&self) -> u64 {
         let ladders: usize = self.portions.iter().flat_map(|portion| &portion.ladders).map(Block::lanes).sum();
-        (ladders + self.portions.len() * self.schedule.points) as u64
+        ladders as u64 * self.schedule.ladder_sweeps + (self.portions.len() * self.schedule.points) as u64
     }
 
     /// Goes through `sweeps` more sweeps, or what is left of the budget, in parallel over blocks. All state is a
@@ -246,7 +248,7 @@ impl<W: Default + Send> Sampler<W> {
             let Portion { uniform, tally, ladders, starts, .. } = portion;
             for _ in 0..sweeps {
                 if let Some(block) = ladders {
-                    block.advance(target, 1, &canvas, round);
+                    block.advance(target, schedule.ladder_sweeps, &canvas, round);
                 }
                 let keep = |start: Start| {
                     if keeps && start.ln_g > f64::NEG_INFINITY {
@@ -269,13 +271,13 @@ impl<W: Default + Send> Sampler<W> {
             self.ladder_rays += ladders;
         }
         self.points[0] += sweeps * (self.portions.len() * self.schedule.points) as u64;
-        self.points[1] += sweeps * self.ladders() * self.offers as u64;
+        self.points[1] += sweeps * schedule.ladder_sweeps * self.ladders() * self.offers as u64;
         self.sweeps += sweeps;
         let evaluations = sweeps * self.a_sweep();
         self.evaluations += evaluations;
         self.effort += evaluations as f64;
         self.schedule.done += sweeps;
-        self.states_a_rung += sweeps * self.ladders();
+        self.states_a_rung += sweeps * schedule.ladder_sweeps * self.ladders();
     }
 
     /// Ladders at work.

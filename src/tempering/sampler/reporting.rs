@@ -40,7 +40,7 @@ impl<W: Default + Send> Sampler<W> {
             round_trips: trips(|t| t.round_trips),
             restarts: trips(|t| t.restarts),
             round_trips_predicted: if chains {
-                ladders as f64 * self.schedule.done as f64 / (2.0 + 2.0 * waits)
+                self.ladder_steps(self.schedule.done) as f64 / (2.0 + 2.0 * waits)
             } else {
                 f64::NAN
             },

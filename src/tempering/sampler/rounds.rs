@@ -44,6 +44,8 @@ fn shift(trial: usize) -> f64 {
     0.75 * (trial as f64 - UNSHIFTED as f64)
 }
 
+/// Independent points that a block should draw at a time.
+const BATCH: f64 = 256.0;
 /// What a state counts for in the first round, before that is measured.
 const FIRST_RATIO: f64 = 0.25;
 /// Share of uniform points, at least, and at most where chains are asked for.
@@ -284,7 +286,7 @@ impl<W: Default + Send> Sampler<W> {
     /// What the round has measured, if it has.
     fn measured(&self, learnt: &Learnt) -> Option<Measured> {
         let probes = self.screen.probes.as_ref()?;
-        let states = (self.schedule.done * self.ladders()) as f64;
+        let states = self.ladder_steps(self.schedule.done) as f64;
         let chains = self.round.ladder.chains() as f64;
         let pixels = f64::from(self.screen.size[0]) * f64::from(self.screen.size[1]);
         let target = learnt.normalisers.target;
@@ -302,7 +304,7 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Cost of a uniform point and of a step of a chain, in rays.
     fn costs(&self, states: f64) -> [f64; 2] {
-        let offered = (self.schedule.done * self.ladders()) as f64 * self.offers as f64;
+        let offered = self.ladder_steps(self.schedule.done) as f64 * self.offers as f64;
         let a_state = (self.ladder_rays as f64 - offered * self.rays_a_point).max(0.0) / states.max(1.0);
         [self.rays_a_point + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
     }
@@ -346,8 +348,10 @@ impl<W: Default + Send> Sampler<W> {
         if ladders > 0 {
             let ln_zeta: Vec<f64> =
                 self.round.ladder.betas().iter().map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) }).collect();
-            let uniform = self.uniform_a_ladder(self.round.ladder.chains()) * self.ladders_a_block as f64;
-            self.schedule.points = (uniform.round() as usize).saturating_sub(self.offers * self.ladders_a_block);
+            let a_sweep = self.uniform_a_ladder(self.round.ladder.chains()) - self.offers as f64;
+            let points = a_sweep.max(0.0) * self.ladders_a_block as f64;
+            self.schedule.ladder_sweeps = if points < 1.0 { 1 } else { (BATCH / points).ceil().max(1.0) as u64 };
+            self.schedule.points = (points * self.schedule.ladder_sweeps as f64).round() as usize;
             self.round.weights = Weights::new(&self.round.ladder, &ln_zeta, self.choice.ratio, self.ln_unit);
             self.round.mixes = self.mixes(&self.counts_by_rung());
         } else {
@@ -356,7 +360,7 @@ impl<W: Default + Send> Sampler<W> {
         }
         let a_sweep = self.a_sweep() as f64;
         let points = (self.portions.len() * self.points_a_block()) as f64;
-        self.round.effort = [a_sweep / points, if ladders > 0 { a_sweep / ladders as f64 } else { 0.0 }];
+        self.round.effort = [a_sweep / points, if ladders > 0 { a_sweep / self.ladder_steps(1) as f64 } else { 0.0 }];
         for portion in &mut self.portions {
             portion.tally.reset_counts();
             if let Some(block) = &mut portion.ladders {
@@ -386,13 +390,18 @@ impl<W: Default + Send> Sampler<W> {
         self.schedule.done = 0;
         let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
         self.round.only_offers = self.schedule.points == 0;
-        self.round.half = sweeps + self.schedule.middle();
+        self.round.half = sweeps + self.schedule.middle() * self.schedule.ladder_sweeps;
     }
 
     /// Uniform points of a block in a sweep, offered or not.
     pub(super) fn points_a_block(&self) -> usize {
-        let offered = if self.ladders() > 0 { self.offers * self.ladders_a_block } else { 0 };
-        offered + self.schedule.points
+        let ladders = if self.ladders() > 0 { self.ladders_a_block } else { 0 };
+        self.offers * ladders * self.schedule.ladder_sweeps as usize + self.schedule.points
+    }
+
+    /// States on each rung of all ladders in so many sweeps.
+    pub(super) fn ladder_steps(&self, sweeps: u64) -> u64 {
+        sweeps * self.schedule.ladder_sweeps * self.ladders()
     }
 
     /// Counts of the round, by rung.
