@@ -8,20 +8,18 @@
 //!   states), on a target that costs nothing.
 
 use std::hint::black_box;
-use std::sync::Arc;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use relt::chain::{Evaluator, Recorder, Target};
 use relt::embree::Hits;
-use relt::film::{Accumulator, Filter, Footprint, Splats};
+use relt::film::{Accumulator, Footprint, Splats};
 use relt::path::unidirectional::{Mapping, Widths, Workspace};
-use relt::path::{Contribution, Contributions};
+use relt::path::Contributions;
 use relt::render::calibration::{LANES, calibrate, record_rays};
-use relt::rng::{Counter, Purpose, Rng, unit_f32};
+use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{Move, Points, Proposals, StepLaw};
-use relt::scene::{Rgb, Scene};
-use relt::tempering::{Block, Combination, LAYERS, Ladder, Weights};
+use relt::scene::Scene;
 
 mod support;
 
@@ -140,47 +138,5 @@ fn splat(group: &mut BenchmarkGroup<WallTime>, scene: &Scene, widths: Widths) {
     });
 }
 
-/// g(x) = 4 x², in grey; the film position is the rest of the block.
-struct Free;
-
-impl Target for Free {
-    type Workspace = Vec<u32>;
-
-    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, live: &mut Vec<u32>) {
-        proposals.begin(live);
-        proposals.draw(0, live);
-        for &lane in &*live {
-            let [x, column, row, _] = proposals.block(0, lane as usize).map(unit_f32);
-            out.lanes[lane as usize] = Contribution::settle([column, row], Rgb::splat(4.0 * x * x)).0;
-        }
-    }
-}
-
-fn ladders(criterion: &mut Criterion) {
-    const FILM: u32 = 256;
-    let footprint = Footprint::new(Filter::Box, FILM, FILM);
-    let mut group = group(criterion, "stages/ladder");
-    for rungs in [2, 4, 8] {
-        let ladder = Arc::new(Ladder::even(rungs));
-        // g^β has the normaliser 4^β/(2β + 1)
-        let ln_z: Vec<f64> = ladder.betas().iter().map(|beta| beta * 4f64.ln() - (2.0 * beta + 1.0).ln()).collect();
-        let weights = Weights::new(Combination::Balance, &ladder, &ln_z, &vec![1.0; rungs], 1.0);
-        // as many uniform points as replicas that move, as the renderer draws them
-        let draws = rungs - 1;
-        let ladders = LANES as usize / (2 * draws);
-        let mut block = Block::new(ladder, Rng::new(0), 0, ladders, draws);
-        group.throughput(Throughput::Elements((ladders * 2 * draws) as u64));
-        let mut splats = Splats::new(LAYERS);
-        group.bench_function(BenchmarkId::from_parameter(rungs), |bencher| {
-            bencher.iter(|| {
-                let mut recorder = Recorder { footprint: &footprint, size: [FILM as f32; 2], splats: &mut splats };
-                block.advance(&Free, 1, &weights, &mut recorder);
-                splats.clear();
-            });
-        });
-    }
-    group.finish();
-}
-
-criterion_group!(benches, scenes, ladders);
+criterion_group!(benches, scenes);
 criterion_main!(benches);

@@ -344,7 +344,8 @@ mod tests {
 
     #[test]
     fn every_option_reaches_the_settings() {
-        let given = "--method re --betas 0,0.25,1 --combine target --mpp 10 --time 5m --seed 7 --threads 1 --pin";
+        let given = "--method re --betas 0,0.25,1 --combine target --uniform-share 0.25 --error absolute --layers \
+                     --mpp 10 --time 5m --seed 7 --threads 1 --pin";
         let given: Vec<_> = given.split(' ').collect();
         let expected = Settings {
             method: Method::ReplicaExchange,
@@ -355,6 +356,9 @@ mod tests {
             time: Some(Duration::from_secs(300)),
             ladder: LadderChoice::Betas(vec![0.0, 0.25, 1.0]),
             combine: Combine::Target,
+            uniform_share: Some(0.25),
+            measure: Measure::Absolute,
+            layers: true,
             mlt: MltSettings::default(),
             packet: PacketChoice::Auto,
         };
@@ -365,6 +369,7 @@ mod tests {
         let expected = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
         assert_eq!(settings(&given.split(' ').collect::<Vec<_>>()).unwrap().mlt, expected);
         assert_eq!(settings(&["--replicas", "6"]).unwrap().ladder, LadderChoice::Replicas(6));
+        assert_eq!(settings(&["--replicas", "auto"]).unwrap().ladder, LadderChoice::Auto);
     }
 
     #[test]

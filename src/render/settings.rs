@@ -323,12 +323,9 @@ mod tests {
     }
 
     #[test]
-    fn a_ladder_needs_the_uniform_replica_and_another() {
-        for k in [0, 1] {
-            let message = faults(|s| s.ladder = LadderChoice::Replicas(k));
-            assert!(message.contains("counts the uniform replica") && message.contains("--method path"), "{message}");
-        }
-        for k in [2, 1024] {
+    fn a_ladder_has_the_uniform_replica_at_least() {
+        assert!(faults(|s| s.ladder = LadderChoice::Replicas(0)).contains("counts the uniform replica"));
+        for k in [1, 2, 1024] {
             assert_eq!(faults(|s| s.ladder = LadderChoice::Replicas(k)), "");
         }
         assert!(faults(|s| s.ladder = LadderChoice::Replicas(1025)).contains("at most 1024"));
@@ -348,6 +345,14 @@ mod tests {
         assert!(of(&[0.0, f64::NAN, 1.0]).contains("NaN is outside [0, 1]"));
         // All faults in one go.
         assert_eq!(of(&[-1.0, 2.0, 0.5]).lines().count(), 5);
+    }
+
+    #[test]
+    fn the_uniform_rung_has_some_share_but_not_all() {
+        for share in [0.0, 1.0, -0.5, f64::NAN] {
+            assert!(faults(|s| s.uniform_share = Some(share)).contains("--uniform-share"), "{share}");
+        }
+        assert_eq!(faults(|s| s.uniform_share = Some(0.75)), "");
     }
 
     #[test]

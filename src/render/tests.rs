@@ -36,7 +36,7 @@ fn bits(engine: &dyn Engine, stage: &Stage) -> Vec<u64> {
 /// Slices of lengths from `lengths`, over and over until all sweeps are done; a picture after each where `watched`.
 fn run(stage: &Stage, settings: &Settings, lengths: &[u64], watched: bool) -> Vec<u64> {
     let mut engine = engine(stage, settings, Some(MUTATIONS));
-    let wanted = engine.sweeps_wanted().expect("a limited run");
+    let wanted = engine.sweeps_left().expect("a limited run");
     let mut done = 0;
     for length in lengths.iter().cycle() {
         let sweeps = (*length).min(wanted - done);
@@ -93,7 +93,7 @@ fn the_normalisation_of_metropolis_varies_by_its_standard_error() {
             .map(|seed| {
                 let stage = Stage { rng: Rng::new(seed), ..stage(&scene) };
                 let mut engine = engine(&stage, &settings, Some(MUTATIONS));
-                engine.advance(&stage, engine.sweeps_wanted().expect("a limited run"));
+                engine.advance(&stage, engine.sweeps_left().expect("a limited run"));
                 engine.develop(&stage).normalisation.expect("every method has one")
             })
             .collect();

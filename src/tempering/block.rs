@@ -247,8 +247,9 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
-    /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones.
-    fn swap(&mut self, canvas: &Canvas, round: &Round) {
+    /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones; a part of
+    /// [`advance`](Self::advance).
+    pub fn swap(&mut self, canvas: &Canvas, round: &Round) {
         let rng = self.parts[0].evaluator.rng();
         let betas = round.ladder.betas();
         for ladder in 0..self.ladders {
