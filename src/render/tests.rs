@@ -68,14 +68,18 @@ fn stage(scene: &Scene) -> Stage<'_> {
 }
 
 #[test]
-fn before_chains_move_the_picture_is_that_of_the_uniform_replica() {
+fn before_chains_move_replica_exchange_is_a_path_tracer() {
     let scene = scene("cornell-box");
     let stage = stage(&scene);
-    let mut engine = engine(&stage, &Settings::default(), Some(MUTATIONS));
-    engine.advance(&stage, 1);
-    let Development { image, layers, .. } = engine.develop(&stage);
+    let picture = |method| {
+        let settings = Settings { method, ..Settings::default() };
+        let mut engine = engine(&stage, &settings, Some(MUTATIONS));
+        engine.advance(&stage, 1);
+        engine.develop(&stage).image
+    };
+    let image = picture(Method::ReplicaExchange);
     assert!(image.mean().iter().all(|channel| *channel > 0.01), "{:?}", image.mean());
-    assert_eq!(layers[0], ("uniform".to_owned(), Plane::Rgb(image)));
+    assert_eq!(image, picture(Method::Path));
 }
 
 /// Mean square of the reported standard errors of 32 runs (7 degrees of freedom or more each) against the variance of

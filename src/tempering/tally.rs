@@ -4,7 +4,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::{
-    Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
+    Choices, Combine, Histogram, LadderChoice, Ladder, ProbeMap, Probes, StepMix, Weights,
     probes::TRIALS,
     steps::{SCALES, StepCount},
 };
@@ -19,6 +19,8 @@ use crate::{
 pub struct Layers {
     /// f of uniform points: the uniform rung's own image E_u.
     pub uniform: Option<usize>,
+    /// f of stratified points: the image of a path tracer, as long as it may be the best.
+    pub even: Option<usize>,
     /// What uniform points add to the balanced image.
     pub hot: Option<usize>,
     /// What tempered states add to the balanced image, in the unit of [`Weights`].
@@ -46,6 +48,7 @@ impl Layers {
         let chains = most_rungs > 1;
         let layers = Layers {
             uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
+            even: layer(choices.ladder == LadderChoice::Auto && choices.combine == Combine::Balance && !choices.layers, 1),
             hot: layer(balance, 1),
             tempered: layer(balance && chains, 1),
             target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
@@ -243,13 +246,16 @@ impl Tally {
         if let Some(layer) = canvas.layers.uniform {
             recorder.splat(layer, point, 1.0, 1.0);
         }
-        if let Some(layer) = canvas.layers.hot {
-            let [effort, _] = round.effort;
-            let share = effort * round.weights.uniform(mixture);
-            recorder.splat(layer, point, share, effort);
-            self.counts[0].luminance += share * point.luminance();
-            self.hot.add(share * point.luminance() / canvas.unit, effort);
+        if let Some(layer) = canvas.layers.even.filter(|_| stratified) {
+            recorder.splat(layer, point, 1.0, 1.0);
         }
+        let [effort, _] = round.effort;
+        let share = effort * round.weights.uniform(mixture);
+        if let Some(layer) = canvas.layers.hot {
+            recorder.splat(layer, point, share, effort);
+        }
+        self.counts[0].luminance += share * point.luminance();
+        self.hot.add(share * point.luminance() / canvas.unit, effort);
         if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
             let g = point.luminance();
             Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));

@@ -36,6 +36,7 @@ impl<W: Default + Send> Sampler<W> {
         let planes = Planes { sampler: self, pending: &pending.splats, learnt: &learnt };
         let combine = self.choices.combine;
         let image = match combine {
+            Combine::Balance if self.screen.layers.hot.is_none() => planes.even(),
             Combine::Balance => planes.balance(),
             Combine::Uniform => planes.uniform(),
             Combine::Target => planes.target(),
@@ -91,6 +92,14 @@ impl<W: Default + Send> Planes<'_, W> {
         })
     }
 
+    /// The mean over each pixel's stratified points.
+    fn even(&self) -> Image {
+        let sums = self.sums(self.sampler.screen.layers.even).expect("a layer of stratified points");
+        let [stratified, _] = self.sampler.points;
+        let mean = PixelMeans::new(self.pixels(), [stratified, 0], self.sampler.screen.footprint.is_box());
+        self.image(|i| mean.of(&sums[i]))
+    }
+
     /// E_u.
     fn uniform(&self) -> Image {
         let sums = self.sums(self.sampler.screen.layers.uniform).expect("a layer of uniform points");
@@ -113,7 +122,7 @@ impl<W: Default + Send> Planes<'_, W> {
     fn layers(&self) -> Vec<(String, Plane)> {
         let on = &self.sampler.screen.layers;
         let [hot, tempered] = [on.hot, on.tempered].map(|layer| self.sums(layer));
-        let main = hot.clone().or_else(|| self.sums(on.uniform)).or_else(|| self.sums(on.target)).unwrap_or_default();
+        let main = hot.clone().or_else(|| self.sums(on.even)).or_else(|| self.sums(on.uniform)).or_else(|| self.sums(on.target)).unwrap_or_default();
         let density = main.iter().enumerate().map(|(i, sums)| (sums[3] + tempered.as_ref().map_or(0.0, |t| t[i][3])) as f32);
         let mut layers = vec![("density".to_owned(), Plane::Gray(density.collect()))];
         if !self.sampler.choices.layers {

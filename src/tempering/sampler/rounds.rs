@@ -214,6 +214,9 @@ impl<W: Default + Send> Sampler<W> {
         if self.choice.ratio == 0.0 {
             self.give_up_ladders();
         } else {
+            if last {
+                self.screen.layers.even = None;
+            }
             let accepted = counts[1].swaps.acceptance();
             let most = self.uniform_a_ladder(self.round.ladder.chains()).floor().max(1.0);
             self.offers = (OFFERS_TAKEN / accepted.max(1e-9)).ceil().min(most) as usize;
@@ -331,6 +334,11 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Chains stop; what they found stays in the image and in the normalisers.
     fn give_up_ladders(&mut self) {
+        // a stratified point is worth more than an offered one: where there are enough, the image is made of them alone
+        let [stratified, offered] = self.points;
+        if self.screen.layers.even.is_some() && stratified > offered {
+            self.screen.layers.hot = None;
+        }
         for portion in &mut self.portions {
             if let Some(block) = portion.ladders.take() {
                 let mut past = vec![Histogram::default(); self.round.ladder.rungs()];
