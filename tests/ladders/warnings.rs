@@ -44,7 +44,7 @@ fn uniform_points_know_how_little_they_know_of_needles() {
 /// Of the runs of each ladder, those of which c or the brightness of the image is off without a warning are no more than
 /// chance admits.
 #[test]
-#[ignore = "chains start from the same points in all groups and remember them: the error between groups is too small"]
+#[ignore = "c of all rungs reports too small an error on needles: 0.08 for 0.12 at K = 2, and says nothing"]
 fn no_ladder_misses_needles_in_silence() {
     let toy = golf();
     for choices in [2, 4].map(|k| replicas(k, Combine::Balance)).into_iter().chain([automatic()]) {
