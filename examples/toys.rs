@@ -9,7 +9,7 @@
 use clap::Parser;
 use rayon::prelude::*;
 use relt::{
-    chain::{Measure, Evaluator, LARGE_STEP_PROBABILITY, LargeSteps},
+    chain::{Evaluator, LARGE_STEP_PROBABILITY, LargeSteps, Measure},
     film::{Filter, Footprint, Heuristic, Image, Plane},
     path::Contribution,
     rng::{Counter, Purpose, Rng},

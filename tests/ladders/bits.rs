@@ -2,13 +2,13 @@
 
 use rayon::ThreadPoolBuilder;
 use relt::{
-    film::{Accumulator, Filter, Footprint, Image},
+    film::Image,
     rng::Rng,
-    tempering::{Block, Canvas, Choices, Combine, Histogram, Ladder, Layers, Round, RungCounts, StepMix, Weights},
+    tempering::{Block, Choices, Combine, Histogram, Ladder, RungCounts},
 };
 
 use crate::{
-    support::{exact_draws, replicas, sampler, two_peaks},
+    support::{Stage, exact_draws, replicas, sampler, two_peaks},
     toys::Toy,
 };
 
@@ -75,37 +75,28 @@ fn block(lanes_a_part: usize, threads: usize) -> (Vec<[f64; 4]>, Vec<Histogram>,
     const LADDERS: usize = 5;
     let (toy, rng) = (two_peaks(), Rng::new(3));
     let ladder = Ladder::new(vec![0.0, 0.1, 0.3, 0.6, 1.0]);
-    let choices = replicas(5, Combine::Balance);
-    let layers = Layers::of(&choices, ladder.rungs());
-    let film = Accumulator::new(16, 1, layers.count, 1.0);
-    let footprint = Footprint::new(Filter::Box, 16, 1);
-    let canvas = Canvas { footprint: &footprint, size: [16, 1], film: &film, layers, probes: None };
-    let round = Round {
-        weights: Weights::new(&ladder, &[0.0, -0.5, -1.2, -2.0, -3.0], 0.25, -3.0),
-        mixes: vec![StepMix::kelemen(); ladder.rungs()],
-        effort: [1.0, 1.0],
-        half: 20,
-        ladder,
-    };
+    let mut stage = Stage::new(ladder, &[0.0, -0.5, -1.2, -2.0, -3.0], 16);
+    stage.round.half = 20;
+    let (canvas, round) = (stage.canvas(), &stage.round);
     let starts: Vec<_> =
         (1..5).map(|k| exact_draws(&toy, round.ladder.betas()[k], 4.1, LADDERS, rng, k as u32)).collect();
     let starts: Vec<_> = starts.iter().map(Vec::as_slice).collect();
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     pool.install(|| {
-        let mut block = Block::new(rng, (0, LADDERS), 5, 2, lanes_a_part, layers.count, [16, 1]);
+        let mut block = Block::new(rng, (0, LADDERS), 5, 2, lanes_a_part, stage.layers.count, [16, 1]);
         block.start(&toy, &starts);
-        block.advance(&toy, 20, &canvas, &round);
+        block.advance(&toy, 20, &canvas, round);
         block.set_offers(rng, 3);
-        block.advance(&toy, 20, &canvas, &round);
-        block.flush(&canvas, &round);
-        block.deposit(&canvas, 0);
+        block.advance(&toy, 20, &canvas, round);
+        block.flush(&canvas, round);
+        block.deposit(&canvas);
         let mut histograms = vec![Histogram::default(); 5];
         block.add_histograms(&mut histograms);
         let mut counts = vec![RungCounts::default(); 5];
         block.add_counts(&mut counts);
         // sums of floats over parts, for reports only, depend on how parts are cut
         counts.iter_mut().for_each(|c| (c.halves, c.luminance) = ([[0.0; 2]; 2], 0.0));
-        let film = (0..layers.count).flat_map(|layer| film.layer(layer)).collect();
+        let film = (0..stage.layers.count).flat_map(|layer| stage.film.layer(layer)).collect();
         (film, histograms, counts, [block.trips().round_trips, block.trips().restarts])
     })
 }

@@ -2,16 +2,15 @@
 
 use relt::{
     chain::{Evaluator, Start, Target, Walkers, replay},
-    film::{Accumulator, Filter, Footprint},
     rng::{Counter, Purpose, Rng, open_unit_f64, unit_f32},
     sample::{Move, StepLaw},
-    tempering::{Block, Canvas, Combine, Histogram, Ladder, Layers, Round, StepMix, Weights, swap_acceptance},
+    tempering::{Block, Histogram, Ladder, swap_acceptance},
 };
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::{
     statistics::f_test,
-    support::{CELLS, Square, cell_shares, cells, exact_draws, replicas},
+    support::{CELLS, Square, Stage, cell_shares, cells, exact_draws},
 };
 
 /// Cell of a point.
@@ -172,17 +171,8 @@ fn sweeps_leave_every_rung_as_it_was() {
     for (offers, betas) in [(1, vec![0.0, 1.0]), (1, vec![0.0, 0.4, 1.0]), (5, vec![0.0, 0.1, 0.3, 0.6, 1.0])] {
         let ladder = Ladder::new(betas);
         let rungs = ladder.rungs();
-        let layers = Layers::of(&replicas(rungs as u32, Combine::Balance), rungs);
-        let film = Accumulator::new(1, 1, layers.count, 1.0);
-        let footprint = Footprint::new(Filter::Box, 1, 1);
-        let canvas = Canvas { footprint: &footprint, size: [1, 1], film: &film, layers, probes: None };
-        let round = Round {
-            weights: Weights::new(&ladder, &vec![0.0; rungs], 0.25, 0.0),
-            mixes: vec![StepMix::kelemen(); rungs],
-            effort: [1.0, 1.0],
-            half: u64::MAX,
-            ladder,
-        };
+        let stage = Stage::new(ladder, &vec![0.0; rungs], 1);
+        let (canvas, round) = (stage.canvas(), &stage.round);
         let draws: Vec<Vec<Start>> = (1..rungs)
             .map(|k| {
                 exact_draws(&target, round.ladder.betas()[k], 16.0, GROUPS as usize * LADDERS, rng, 100 + k as u32)
@@ -193,12 +183,12 @@ fn sweeps_leave_every_rung_as_it_was() {
         for group in 0..GROUPS as usize {
             let own = group * LADDERS..(group + 1) * LADDERS;
             let starts: Vec<&[Start]> = draws.iter().map(|of_rung| &of_rung[own.clone()]).collect();
-            let mut block = Block::new(rng, (own.start as u32, LADDERS), rungs, offers, 512, layers.count, [1, 1]);
+            let mut block = Block::new(rng, (group, LADDERS), rungs, offers, 512, stage.layers.count, [1, 1]);
             block.start(&target, &starts);
             for of_sweep in &mut seen {
                 block.forget_tempered();
-                block.advance(&target, 1, &canvas, &round);
-                block.flush(&canvas, &round);
+                block.advance(&target, 1, &canvas, round);
+                block.flush(&canvas, round);
                 let mut histograms = vec![Histogram::default(); rungs];
                 block.add_histograms(&mut histograms);
                 of_sweep.iter_mut().zip(&histograms).for_each(|(of_rung, h)| of_rung.push(shares(h)));

@@ -4,10 +4,10 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::{
     statistics::{mean, t_test},
-    support::{Run, Square, betas, replicas, runs, two_peaks},
+    support::{Run, Square, automatic, betas, replicas, runs, two_peaks},
     toys::{self, Shape, Toy},
 };
-use relt::tempering::{Choices, Combine};
+use relt::tempering::Combine;
 
 /// ∫ f over [0, 1] by the midpoint rule with `n` cells.
 fn integral(n: u32, f: impl Fn(f64) -> f64) -> f64 {
@@ -130,12 +130,9 @@ fn errors_that_whole_runs_report_cover_the_truth() {
     const RUNS: u64 = 200;
     let toy = two_peaks();
     let most = Binomial::new(0.08, RUNS).expect("a probability").inverse_cdf(1.0 - 1e-3);
-    for choices in [
-        replicas(1, Combine::Balance),
-        replicas(2, Combine::Balance),
-        replicas(4, Combine::Balance),
-        Choices::default(),
-    ] {
+    for choices in
+        [replicas(1, Combine::Balance), replicas(2, Combine::Balance), replicas(4, Combine::Balance), automatic()]
+    {
         let runs = runs(&toy, &choices, 16, 1 << 15, RUNS);
         let mbar = |run: &Run| run.learnt.normalisers.target;
         let off = |e: f64, error: f64| (e - toy.c().ln()).abs() > 2.0 * error;

@@ -2,13 +2,16 @@
 
 use rayon::prelude::*;
 use relt::{
-    chain::{Evaluator, Start, Target},
-    film::{Filter, Footprint, Plane},
+    chain::{Evaluator, Measure, Start, Target},
+    film::{Accumulator, Filter, Footprint, Plane},
     path::{Contribution, Contributions},
     rng::{Counter, Purpose, Rng, open_unit_f64, unit_f32},
     sample::{Move, Points, Proposals},
     scene::Rgb,
-    tempering::{Choices, Combine, Ladder, LadderChoice, Learnt, RoundReport, Sampler, Setup},
+    tempering::{
+        Canvas, Choices, Combine, Ladder, LadderChoice, Layers, Learnt, PointGroups, Round, RoundReport, Sampler,
+        Setup, StepMix, Weights,
+    },
 };
 
 use crate::toys::{Shape, Toy};
@@ -127,12 +130,68 @@ pub fn runs<T: Target>(target: &T, choices: &Choices, columns: u32, evaluations:
     (0..n).into_par_iter().map(|seed| run(target, choices.clone(), columns, evaluations, seed)).collect()
 }
 
-/// K replicas.
+/// K replicas that follow luminance itself, of which normalisers are known.
 pub fn replicas(k: u32, combine: Combine) -> Choices {
-    Choices { ladder: LadderChoice::Replicas(k), combine, ..Choices::default() }
+    Choices { ladder: LadderChoice::Replicas(k), combine, ..automatic() }
 }
 
 /// Inverse temperatures as given, and the balance heuristic.
 pub fn betas(betas: &[f64]) -> Choices {
-    Choices { ladder: LadderChoice::Betas(betas.to_vec()), ..Choices::default() }
+    Choices { ladder: LadderChoice::Betas(betas.to_vec()), ..automatic() }
+}
+
+/// All as it comes, but for the luminance that chains follow.
+pub fn automatic() -> Choices {
+    Choices { measure: Measure::Absolute, ..Choices::default() }
+}
+
+/// What blocks of ladders work on where no sampler leads them: an image of one row with the layers of the balance
+/// heuristic, and a round without end.
+pub struct Stage {
+    footprint: Footprint,
+    columns: u32,
+    groups: PointGroups,
+    /// The film.
+    pub film: Accumulator,
+    /// What its layers hold.
+    pub layers: Layers,
+    /// The round.
+    pub round: Round,
+}
+
+impl Stage {
+    /// For that ladder, with weights as if ln Z were `ln_z`.
+    pub fn new(ladder: Ladder, ln_z: &[f64], columns: u32) -> Stage {
+        let rungs = ladder.rungs();
+        let layers = Layers::of(&replicas(rungs as u32, Combine::Balance), rungs);
+        let mixes = vec![StepMix::about(2.0); rungs];
+        Stage {
+            footprint: Footprint::new(Filter::Box, columns, 1),
+            columns,
+            groups: PointGroups::new(1),
+            film: Accumulator::new(columns, 1, layers.count, 1.0),
+            layers,
+            round: Round {
+                weights: Weights::new(&ladder, ln_z, 0.25, 0.0),
+                mixes: std::array::from_fn(|_| mixes.clone()),
+                effort: [1.0, 1.0],
+                only_offers: true,
+                half: u64::MAX,
+                ladder,
+            },
+        }
+    }
+
+    /// What blocks record to.
+    pub fn canvas(&self) -> Canvas<'_> {
+        Canvas {
+            footprint: &self.footprint,
+            size: [self.columns, 1],
+            film: &self.film,
+            unit: 1.0,
+            layers: self.layers,
+            probes: None,
+            groups: &self.groups,
+        }
+    }
 }

@@ -1,14 +1,13 @@
 //! Swaps and round trips against what is known of them.
 
 use relt::{
-    film::{Accumulator, Filter, Footprint},
     rng::Rng,
-    tempering::{Block, Canvas, Combine, Ladder, Layers, Round, StepMix, Weights},
+    tempering::{Block, Combine, Ladder},
 };
 
 use crate::{
     statistics::t_test,
-    support::{Square, betas, exact_draws, replicas, runs},
+    support::{Square, Stage, betas, exact_draws, replicas, runs},
 };
 
 /// Range of ln g of the exponential target e^{s y}.
@@ -73,21 +72,12 @@ fn rungs_are_placed_at_equal_rejection() {
 fn trips(ladders: usize, rungs: usize, sweeps: u64) -> [u64; 2] {
     let (target, rng) = (Square(|_, _| 3.0), Rng::new(1));
     let ladder = Ladder::even(rungs);
-    let layers = Layers::of(&replicas(rungs as u32, Combine::Balance), rungs);
-    let film = Accumulator::new(1, 1, layers.count, 1.0);
-    let footprint = Footprint::new(Filter::Box, 1, 1);
-    let canvas = Canvas { footprint: &footprint, size: [1, 1], film: &film, layers, probes: None };
-    let round = Round {
-        weights: Weights::new(&ladder, &vec![0.0; rungs], 0.25, 0.0),
-        mixes: vec![StepMix::kelemen(); rungs],
-        effort: [1.0, 1.0],
-        half: u64::MAX,
-        ladder,
-    };
+    let stage = Stage::new(ladder, &vec![0.0; rungs], 1);
+    let (canvas, round) = (stage.canvas(), &stage.round);
     let starts = exact_draws(&target, 1.0, 3.1, ladders, rng, 0);
-    let mut block = Block::new(rng, (0, ladders), rungs, 1, 512, layers.count, [1, 1]);
+    let mut block = Block::new(rng, (0, ladders), rungs, 1, 512, stage.layers.count, [1, 1]);
     block.start(&target, &vec![&starts[..]; rungs - 1]);
-    block.advance(&target, sweeps, &canvas, &round);
+    block.advance(&target, sweeps, &canvas, round);
     let mut counts = vec![Default::default(); rungs];
     block.add_counts(&mut counts);
     for (k, counts) in counts.iter().enumerate().skip(1) {
