@@ -12,6 +12,9 @@ pub const RATIOS: [f64; 8] = [0.0, 1.0 / 1024.0, 1.0 / 256.0, 1.0 / 64.0, 1.0 / 
 /// The ratio of the most evenly weighed image, 1.
 pub const EVEN: usize = RATIOS.len() - 2;
 
+/// The first of the layers with squares of what uniform points add.
+const SQUARES: usize = RATIOS.len();
+
 /// Ways to move that are tried side by side, on a third of the ladders each.
 pub const TRIALS: usize = 3;
 
@@ -58,7 +61,7 @@ impl ProbeMap {
     }
 }
 
-/// Luminance gathered by the probes in each half of the blocks, one layer for each of [`RATIOS`].
+/// Luminance gathered by the probes in each half of the blocks, one layer for each of [`RATIOS`], and as many for squares.
 pub struct Probes {
     halves: [Accumulator; 2],
     trials: [[Accumulator; 2]; TRIALS],
@@ -68,29 +71,44 @@ impl Probes {
     /// Empty probes; `unit` as for the film.
     pub fn new(map: &ProbeMap, unit: f64) -> Probes {
         let film = |layers: usize| [(); 2].map(|()| Accumulator::new(map.len() as u32, 1, layers, unit));
-        Probes { halves: film(RATIOS.len()), trials: [(); TRIALS].map(|()| film(1)) }
+        Probes { halves: film(2 * RATIOS.len()), trials: [(); TRIALS].map(|()| film(1)) }
     }
 
     /// Splats for [`deposit`](Self::deposit).
     pub fn splats() -> Splats {
-        Splats::new(RATIOS.len())
+        Splats::new(2 * RATIOS.len())
     }
 
-    /// What a uniform point adds for each ratio.
+    /// What a uniform point adds for each ratio, and what its square counts in the most evenly weighed mean.
     #[inline(always)]
-    pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64) {
+    pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64, even: f64) {
         for (layer, ratio) in RATIOS.into_iter().enumerate() {
-            splats.push(layer, Splat { pixel: probe, rgb: [value(ratio) as f32, 0.0, 0.0], weight: 1.0 });
+            let value = value(ratio);
+            splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight: 1.0 });
+            let rgb = [value * value, even * value * value, 0.0].map(|v| v as f32);
+            splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
         }
     }
 
-    /// What a state of a chain of expected weight `weight` adds for each ratio but 0, were its weight one.
+    /// What a state of a chain of expected weight `weight` adds for each ratio, were its weight one.
+    ///
+    /// `uniform` is what a uniform point in its place would add, and `even` what a state counts in the most evenly weighed
+    /// mean.
     #[inline(always)]
-    pub fn tempered(splats: &mut Splats, probe: u32, weight: f64, value: impl Fn(f64) -> f64) {
-        for (layer, ratio) in RATIOS.into_iter().enumerate().skip(1) {
-            let value = value(ratio);
+    pub fn tempered(
+        splats: &mut Splats,
+        probe: u32,
+        weight: f64,
+        value: impl Fn(f64) -> f64,
+        uniform: impl Fn(f64) -> f64,
+        even: f64,
+    ) {
+        for (layer, ratio) in RATIOS.into_iter().enumerate() {
+            let (value, point) = (value(ratio), uniform(ratio));
             let rgb = [0.0, weight * value, weight * value * value].map(|v| v as f32);
             splats.push(layer, Splat { pixel: probe, rgb, weight: 0.0 });
+            let rgb = [0.0, 0.0, (weight * even * point * point) as f32];
+            splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
         }
     }
 
@@ -102,6 +120,13 @@ impl Probes {
             self.trials[trial][half].deposit(&mut even);
         }
         self.halves[half].deposit(splats);
+    }
+
+    /// For every probe, Σ of squares of what uniform points add: over uniform points, and the two parts of the most evenly
+    /// weighed mean, that of uniform points and that of states.
+    pub fn squares(&self, ratio: usize) -> Vec<[f64; 3]> {
+        let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(SQUARES + ratio));
+        a.into_iter().zip(b).map(|(a, b)| [0, 1, 2].map(|i| a[i] + b[i])).collect()
     }
 
     /// Σ over the states of a trial in both halves of every probe, as they are weighed most evenly.

@@ -258,7 +258,8 @@ impl Tally {
         self.hot.add(share * point.luminance() / canvas.unit, effort);
         if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
             let g = point.luminance();
-            Probes::uniform(&mut self.probes, probe, |ratio| g * round.weights.uniform_with(ratio, mixture));
+            let value = |ratio| g * round.weights.uniform_with(ratio, mixture);
+            Probes::uniform(&mut self.probes, probe, value, round.weights.uniform_with(1.0, mixture));
         }
     }
 
@@ -283,7 +284,10 @@ impl Tally {
         self.tempered.add(value * state.luminance() / canvas.unit, effort * weight);
         if let Some(probe) = canvas.probe(state) {
             let g = state.luminance();
-            Probes::tempered(&mut self.probes, probe, weight, |ratio| g * round.weights.tempered_with(ratio, mixture));
+            let value = |ratio| g * round.weights.tempered_with(ratio, mixture);
+            let uniform = |ratio| g * round.weights.uniform_with(ratio, mixture);
+            let even = round.weights.tempered_with(1.0, mixture);
+            Probes::tempered(&mut self.probes, probe, weight, value, uniform, even);
         }
     }
 

@@ -22,6 +22,8 @@ pub struct Measured {
     /// By ratio and probe: the two halves' Σ over uniform points, Σ over states, number of uniform points, and Σ of squares
     /// over states.
     pub probes: Vec<Vec<[[f64; 4]; 2]>>,
+    /// By ratio and probe: [`Probes::squares`](super::Probes::squares).
+    pub squares: Vec<Vec<[f64; 3]>>,
     /// Number of pixels of the film.
     pub pixels: f64,
     /// States of chains in the round, all tempered rungs.
@@ -120,6 +122,21 @@ impl Measured {
         [halves.map(|[uniform, _, points, _]| uniform / points), halves.map(|[_, states, ..]| states * self.tempered_scale)]
     }
 
+    /// How much larger the mean square of what a uniform point adds is than uniform points alone have shown: chains find
+    /// the rare bright points that decide it. 1 where they show nothing new.
+    fn unseen(&self, i: usize, importances: &[f64]) -> f64 {
+        let (mut alone, mut together) = (0.0, 0.0);
+        for ((squares, halves), importance) in self.squares[i].iter().zip(&self.probes[i]).zip(importances) {
+            let points = halves[0][2] + halves[1][2];
+            if points > 0.0 {
+                let [uniform, hot, tempered] = squares;
+                alone += importance * uniform / points;
+                together += importance * (hot / points + 0.5 * tempered * self.tempered_scale);
+            }
+        }
+        if alone > 0.0 { (together / alone).max(1.0) } else { 1.0 }
+    }
+
     /// U and T with the ratio number `i`.
     fn variances(&self, i: usize, importances: &[f64]) -> [f64; 2] {
         let [mut u, mut t, mut seen] = [0.0; 3];
@@ -136,7 +153,7 @@ impl Measured {
             let mean = 0.5 * (tempered[0] + tempered[1]);
             t += importance * (spread + self.normaliser_variance * mean * mean) * self.states;
         }
-        if seen == 0.0 { [0.0; 2] } else { [u * self.pixels / seen, t / seen] }
+        if seen == 0.0 { [0.0; 2] } else { [u * self.pixels / seen * self.unseen(i, importances), t / seen] }
     }
 }
 

@@ -295,6 +295,7 @@ impl<W: Default + Send> Sampler<W> {
         let target = learnt.normalisers.target;
         Some(Measured {
             probes: (0..RATIOS.len()).map(|ratio| probes.sums(ratio)).collect(),
+            squares: (0..RATIOS.len()).map(|ratio| probes.squares(ratio)).collect(),
             pixels,
             states: chains * states,
             tempered_scale: pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states),
