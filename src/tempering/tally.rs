@@ -4,7 +4,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::{
-    Choices, Combine, Histogram, LadderChoice, Ladder, ProbeMap, Probes, StepMix, Weights,
+    Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
     probes::TRIALS,
     steps::{SCALES, StepCount},
 };
@@ -19,7 +19,8 @@ use crate::{
 pub struct Layers {
     /// f of uniform points: the uniform rung's own image E_u.
     pub uniform: Option<usize>,
-    /// f of stratified points: the image of a path tracer, as long as it may be the best.
+    /// f of stratified points: the image of a path tracer, as long as it may be the best. Also where chains are wanted
+    /// follows from it.
     pub even: Option<usize>,
     /// What uniform points add to the balanced image.
     pub hot: Option<usize>,
@@ -48,8 +49,8 @@ impl Layers {
         let chains = most_rungs > 1;
         let layers = Layers {
             uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
-            even: layer(choices.ladder == LadderChoice::Auto && choices.combine == Combine::Balance && !choices.layers, 1),
-            hot: layer(balance, 1),
+            even: layer(balance, 1),
+            hot: layer(balance && chains, 1),
             tempered: layer(balance && chains, 1),
             target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
             rungs: layer(choices.layers && chains, most_rungs.saturating_sub(1)),
@@ -86,6 +87,7 @@ pub struct PointGroups(Vec<Mutex<Seen>>);
 struct Seen {
     histogram: Histogram,
     hot: Sum,
+    even: Sum,
 }
 
 /// Σ of luminances that went to the balanced image, in units of 2⁻⁶⁰ of the film's, and Σ of weights that went with
@@ -126,6 +128,7 @@ impl PointGroups {
         let mut seen = self.locked(group);
         seen.histogram.merge(&std::mem::take(&mut tally.histograms[0]));
         seen.hot.merge(std::mem::take(&mut tally.hot));
+        seen.even.merge(std::mem::take(&mut tally.even));
     }
 
     /// Adds a group's points to `sum`.
@@ -133,9 +136,10 @@ impl PointGroups {
         sum.merge(&self.locked(group).histogram);
     }
 
-    /// What a group's points added to the balanced image.
-    pub fn hot(&self, group: usize) -> Sum {
-        self.locked(group).hot
+    /// What a group's points added to the balanced image, and their whole luminance.
+    pub fn hot_and_even(&self, group: usize) -> [Sum; 2] {
+        let seen = self.locked(group);
+        [seen.hot, seen.even]
     }
 
     /// Forgets ln g, which is about to mean something else.
@@ -218,7 +222,9 @@ pub struct Tally {
     probes: Splats,
     /// What uniform points added to the balanced image, since ever or since it was taken.
     pub hot: Sum,
-    /// The same of tempered states, since ever.
+    /// The whole luminance of stratified points.
+    even: Sum,
+    /// The same as `hot` of tempered states, since ever.
     pub tempered: Sum,
 }
 
@@ -231,6 +237,7 @@ impl Tally {
             splats: Splats::new(layers),
             probes: Probes::splats(),
             hot: Sum::default(),
+            even: Sum::default(),
             tempered: Sum::default(),
         }
     }
@@ -249,13 +256,16 @@ impl Tally {
         if let Some(layer) = canvas.layers.even.filter(|_| stratified) {
             recorder.splat(layer, point, 1.0, 1.0);
         }
-        let [effort, _] = round.effort;
-        let share = effort * round.weights.uniform(mixture);
-        if let Some(layer) = canvas.layers.hot {
-            recorder.splat(layer, point, share, effort);
+        if stratified {
+            self.even.add(point.luminance() / canvas.unit, 1.0);
         }
-        self.counts[0].luminance += share * point.luminance();
-        self.hot.add(share * point.luminance() / canvas.unit, effort);
+        if let Some(layer) = canvas.layers.hot {
+            let [effort, _] = round.effort;
+            let share = effort * round.weights.uniform(mixture);
+            recorder.splat(layer, point, share, effort);
+            self.counts[0].luminance += share * point.luminance();
+            self.hot.add(share * point.luminance() / canvas.unit, effort);
+        }
         if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
             let g = point.luminance();
             let value = |ratio| g * round.weights.uniform_with(ratio, mixture);

@@ -85,7 +85,7 @@ impl<W: Default + Send> Planes<'_, W> {
     fn balance(&self) -> Image {
         let hot = self.sums(self.sampler.screen.layers.hot).expect("a layer of the balanced image");
         let tempered = self.sums(self.sampler.screen.layers.tempered);
-        let (mean, scale) = (self.pixel_means(), self.tempered_scale());
+        let (mean, scale) = (self.hot_means(), self.tempered_scale());
         self.image(|i| {
             let hot = mean.of(&hot[i]);
             [0, 1, 2].map(|ch| hot[ch] + tempered.as_ref().map_or(0.0, |sums| sums[i][ch] * scale))
@@ -125,7 +125,7 @@ impl<W: Default + Send> Planes<'_, W> {
         let main = hot.clone().or_else(|| self.sums(on.even)).or_else(|| self.sums(on.uniform)).or_else(|| self.sums(on.target)).unwrap_or_default();
         let density = main.iter().enumerate().map(|(i, sums)| (sums[3] + tempered.as_ref().map_or(0.0, |t| t[i][3])) as f32);
         let mut layers = vec![("density".to_owned(), Plane::Gray(density.collect()))];
-        if !self.sampler.choices.layers {
+        if !self.sampler.choices.layers || hot.is_none() {
             return layers;
         }
         layers.push(("uniform".into(), Plane::Rgb(self.uniform())));
@@ -133,7 +133,7 @@ impl<W: Default + Send> Planes<'_, W> {
             return layers;
         }
         layers.push(("target".into(), Plane::Rgb(self.target())));
-        let mean = self.pixel_means();
+        let mean = self.hot_means();
         let hot = hot.unwrap_or_default();
         layers.push(("rung1".into(), Plane::Rgb(self.image(|i| mean.of(&hot[i])))));
         let scale = self.tempered_scale();
@@ -142,6 +142,13 @@ impl<W: Default + Send> Planes<'_, W> {
             layers.push((format!("rung{}", k + 1), Plane::Rgb(self.image(|i| [0, 1, 2].map(|ch| sums[i][ch] * scale)))));
         }
         layers
+    }
+
+    /// Means over the points since chains started.
+    fn hot_means(&self) -> PixelMeans {
+        let [stratified, offered] = self.sampler.points;
+        let points = [stratified - self.sampler.bootstrap, offered];
+        PixelMeans::new(self.pixels(), points, self.sampler.screen.footprint.is_box())
     }
 
     fn pixel_means(&self) -> PixelMeans {

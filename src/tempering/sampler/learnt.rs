@@ -17,16 +17,15 @@ pub struct Learnt {
 }
 
 impl Learnt {
-    /// From the histograms of independent groups, and the mean luminances that uniform points and tempered states add to
-    /// the balanced image, the latter in units of e^`ln_unit`.
-    pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>], [hot, tempered]: [Estimate; 2], ln_unit: f64) -> Learnt {
+    /// From the histograms of independent groups.
+    pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>], luminance: Luminance) -> Learnt {
         let groups: Vec<&[Histogram]> = groups.iter().map(Vec::as_slice).collect();
         let normalisers = Normalisers::solve(ladder, &groups);
         Learnt {
             uniform: uniform_mean(&groups),
             stepping_stones: stepping_stones(ladder.betas(), &groups),
             density: DensityOfStates::new(ladder, &groups, &normalisers),
-            luminance: mean_luminance(hot, tempered, &normalisers.target, ln_unit),
+            luminance: luminance.estimate(&normalisers.target),
             normalisers,
         }
     }
@@ -45,15 +44,34 @@ impl Learnt {
     }
 }
 
-/// hot + Ẑ · tempered. The errors of the first and of Ẑ come from the same uniform points and are added, which is more
-/// than they can be; that of the states is independent of them as far as chains forget their starts.
-fn mean_luminance(hot: Estimate, tempered: Estimate, target: &Estimate, ln_unit: f64) -> Estimate {
-    if tempered.value == 0.0 {
-        return hot;
+/// Where the mean luminance of the image comes from.
+pub(super) enum Luminance {
+    /// Mean luminances that uniform points and tempered states add to the balanced image, the latter in units of
+    /// e^`ln_unit`.
+    Balanced { hot: Estimate, tempered: Estimate, ln_unit: f64 },
+    /// The mean over stratified points.
+    Mean(Estimate),
+    /// c itself.
+    Normaliser,
+}
+
+impl Luminance {
+    /// The estimate, with c known to be `target`. Balanced: hot + Ẑ · tempered. The errors of the first and of Ẑ come from
+    /// the same uniform points and are added, which is more than they can be; that of the states is independent of them
+    /// as far as chains forget their starts.
+    fn estimate(self, target: &Estimate) -> Estimate {
+        let (hot, tempered, ln_unit) = match self {
+            Luminance::Balanced { hot, tempered, ln_unit } => (hot, tempered, ln_unit),
+            Luminance::Mean(mean) => return mean,
+            Luminance::Normaliser => return *target,
+        };
+        if tempered.value == 0.0 {
+            return hot;
+        }
+        let scale = libm::exp(target.ln_value - ln_unit);
+        let states = tempered.value * scale;
+        let value = hot.value + states;
+        let shared = hot.standard_error + states * target.relative_error;
+        Estimate::from_ln(libm::log(value), shared.hypot(tempered.standard_error * scale) / value)
     }
-    let scale = libm::exp(target.ln_value - ln_unit);
-    let states = tempered.value * scale;
-    let value = hot.value + states;
-    let shared = hot.standard_error + states * target.relative_error;
-    Estimate::from_ln(libm::log(value), shared.hypot(tempered.standard_error * scale) / value)
 }

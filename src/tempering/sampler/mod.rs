@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 pub use development::Development;
 pub use learnt::Learnt;
+use learnt::Luminance;
 
 use super::{
     Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport, Sum,
@@ -64,6 +65,8 @@ pub struct Sampler<W> {
     image_correlation: Option<f64>,
     /// States of chains on each rung so far, of all ladders.
     states_a_rung: u64,
+    /// Uniform points before chains started.
+    bootstrap: u64,
     /// Uniform points so far: those that came in the order of pixels, and those offered to ladders.
     points: [u64; 2],
     /// Rays of a uniform point, as the first sweeps had them.
@@ -83,7 +86,10 @@ struct Screen {
     size: [u32; 2],
     film: Accumulator,
     unit: f64,
+    /// The layers that are recorded to.
     layers: Layers,
+    /// All that there are.
+    prepared: Layers,
     map: ProbeMap,
     probes: Option<Probes>,
     groups: PointGroups,
@@ -155,7 +161,9 @@ impl<W: Default + Send> Sampler<W> {
             size,
             film: Accumulator::new(size[0], size[1], layers.count, unit),
             unit,
-            layers,
+            // before chains start there is nothing to balance: whole points, fireflies and all, would stay in the image
+            layers: Layers { hot: None, ..layers },
+            prepared: layers,
             probes: learns.then(|| Probes::new(&map, unit)),
             map,
             groups: PointGroups::new(plan.blocks),
@@ -195,6 +203,7 @@ impl<W: Default + Send> Sampler<W> {
             moved: false,
             ladder_rays: 0,
             image_correlation: None,
+            bootstrap: 0,
             points: [0; 2],
             rays_a_point: 0.0,
             sweeps: 0,
@@ -275,7 +284,9 @@ impl<W: Default + Send> Sampler<W> {
         self.sweeps += sweeps;
         let evaluations = sweeps * self.a_sweep();
         self.evaluations += evaluations;
-        self.effort += evaluations as f64;
+        if self.screen.layers.hot.is_some() {
+            self.effort += evaluations as f64;
+        }
         self.schedule.done += sweeps;
         self.states_a_rung += sweeps * schedule.ladder_sweeps * self.ladders();
     }

@@ -40,7 +40,9 @@ impl<W: Default + Send> Sampler<W> {
             round_trips: trips(|t| t.round_trips),
             restarts: trips(|t| t.restarts),
             round_trips_predicted: if chains {
-                self.ladder_steps(self.schedule.done) as f64 / (2.0 + 2.0 * waits)
+                // with one pair, which swaps in every sweep and not in every second, twice as many
+                let one_pair = if rejection.len() == 1 { 2.0 } else { 1.0 };
+                one_pair * self.ladder_steps(self.schedule.done) as f64 / (2.0 + 2.0 * waits)
             } else {
                 f64::NAN
             },

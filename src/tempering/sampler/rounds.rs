@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Learnt, MOST_AUTOMATIC, Sampler, at_most};
+use super::{Learnt, Luminance, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
     chain::{Importance, Start, Target, resample},
     scene::Rgb,
@@ -74,14 +74,14 @@ impl<W: Default + Send> Sampler<W> {
             _ => self.adapt(&learnt),
         };
         report.choices = choices;
-        report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.effort);
+        report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.evaluations as f64);
         self.reports.push(report);
         self.begin_round(&learnt);
     }
 
     /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
     fn weigh(&mut self) {
-        let layer = self.screen.layers.hot.expect("a balanced image");
+        let layer = self.screen.layers.even.expect("a layer of stratified points");
         let luminance = |[r, g, b, points]: [f64; 4]| {
             let rgb = Rgb::new(r as f32, g as f32, b as f32);
             [f64::from(crate::path::luminance(rgb)), points]
@@ -116,20 +116,28 @@ impl<W: Default + Send> Sampler<W> {
 
     /// What groups of histograms say; `pending` is what each block's states would add to the balanced image.
     pub(super) fn learnt(&self, groups: &[Vec<Histogram>], pending: &[Sum]) -> Learnt {
-        let (mut hot, mut tempered) = (Vec::new(), Vec::new());
+        let estimate = |sums: &[(f64, f64)]| {
+            let sums: Vec<(f64, f64)> = sums.iter().map(|(s, n)| (s * self.screen.unit, *n)).collect();
+            Estimate::from_sums(&sums)
+        };
+        let [mut hot, mut tempered, mut even] = [(); 3].map(|()| Vec::new());
         for (number, portion) in self.portions.iter().enumerate() {
             let [mut points, mut states] = portion.ladders.as_ref().map_or(portion.added, Block::added);
-            points.merge(self.screen.groups.hot(number));
+            let [more, all] = self.screen.groups.hot_and_even(number);
+            points.merge(more);
             pending.get(number).into_iter().for_each(|sum| states.merge(*sum));
             hot.push(points.values());
             // each block's states stand for as much of the image as any other's
             tempered.push((states.values().0, self.effort / self.portions.len() as f64));
+            even.push(all.values());
         }
-        let parts = [hot, tempered].map(|sums| {
-            let sums: Vec<(f64, f64)> = sums.into_iter().map(|(s, n)| (s * self.screen.unit, n)).collect();
-            Estimate::from_sums(&sums)
-        });
-        Learnt::of(&self.round.ladder, groups, parts, self.ln_unit)
+        let layers = &self.screen.layers;
+        let luminance = match (layers.hot, layers.even) {
+            (Some(_), _) => Luminance::Balanced { hot: estimate(&hot), tempered: estimate(&tempered), ln_unit: self.ln_unit },
+            (None, Some(_)) => Luminance::Mean(estimate(&even)),
+            (None, None) => Luminance::Normaliser,
+        };
+        Learnt::of(&self.round.ladder, groups, luminance)
     }
 
     /// Histograms by rung of group `number`: what block `number` of the ladders saw, and stratified points.
@@ -177,6 +185,8 @@ impl<W: Default + Send> Sampler<W> {
             portion.ladders = Some(block);
         });
         self.ladders_a_block = ladders;
+        self.screen.layers = self.screen.prepared;
+        self.bootstrap = self.points[0];
         self.rays_a_point = self.rays as f64 / self.evaluations as f64;
         self.choice = Choice {
             ratio: FIRST_RATIO,
@@ -215,7 +225,7 @@ impl<W: Default + Send> Sampler<W> {
             self.give_up_ladders();
         } else {
             if last {
-                self.screen.layers.even = None;
+                self.screen.layers.even = None; // never looked at again
             }
             let accepted = counts[1].swaps.acceptance();
             let most = self.uniform_a_ladder(self.round.ladder.chains()).floor().max(1.0);
@@ -335,9 +345,8 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Chains stop; what they found stays in the image and in the normalisers.
     fn give_up_ladders(&mut self) {
-        // a stratified point is worth more than an offered one: where there are enough, the image is made of them alone
-        let [stratified, offered] = self.points;
-        if self.screen.layers.even.is_some() && stratified > offered {
+        // a stratified point is worth more than an offered one, and there are many more of them to come
+        if self.choices.ladder == LadderChoice::Auto {
             self.screen.layers.hot = None;
         }
         for portion in &mut self.portions {
