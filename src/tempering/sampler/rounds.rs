@@ -24,6 +24,8 @@ const LEARNING_PART: f64 = 0.25;
 const FIRST_ROUND: u64 = 1 << 18;
 const FIRST_ROUND_A_PIXEL: u64 = 4;
 const LEARNING_ROUNDS: u32 = 5;
+/// Rounds from which on chains may be given up.
+const ROUNDS_OF_GRACE: u32 = 3;
 /// Lanes that are evaluated together; a ladder longer than that is cut into parts.
 const LANES_A_PART: usize = 512;
 /// Rungs are placed anew where the rejections that the density of states predicts differ by more.
@@ -208,7 +210,8 @@ impl<W: Default + Send> Sampler<W> {
         let choice = self.tune(learnt, last);
         let counts = self.counts_by_rung();
         said.extend(self.choose_steps(learnt));
-        if !last && !matches!(self.choices.ladder, LadderChoice::Betas(_)) {
+        let goes_on = !last && choice.is_none_or(|choice| choice.ratio > 0.0);
+        if goes_on && !matches!(self.choices.ladder, LadderChoice::Betas(_)) {
             said.extend(self.place_anew(learnt));
         }
         if let Some(choice) = choice {
@@ -233,7 +236,7 @@ impl<W: Default + Send> Sampler<W> {
             let (rng, offers) = (self.rng, self.offers);
             self.portions.iter_mut().flat_map(|p| &mut p.ladders).for_each(|block| block.set_offers(rng, offers));
         }
-        if last {
+        if last || self.choice.ratio == 0.0 {
             self.schedule.frozen = true;
             self.schedule.learning = self.evaluations;
             self.screen.probes = None;
@@ -288,7 +291,8 @@ impl<W: Default + Send> Sampler<W> {
     fn tune(&self, learnt: &Learnt, last: bool) -> Option<Choice> {
         // while chains are to show what they can do they keep a part of the work, less in each round
         let most = match (self.choices.ladder == LadderChoice::Auto, last) {
-            (true, true) => 1.0,
+            // chains that promise nothing after some rounds are not listened to any longer
+            (true, last) if last || self.schedule.round >= ROUNDS_OF_GRACE => 1.0,
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
             _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
         };
