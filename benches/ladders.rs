@@ -6,7 +6,9 @@
 
 use std::time::Duration;
 
-use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime};
+use criterion::{
+    BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime,
+};
 use rayon::prelude::*;
 use relt::{
     chain::{Start, Target, resample},
@@ -15,7 +17,7 @@ use relt::{
     rng::{Counter, Purpose, Rng, unit_f32},
     sample::Proposals,
     scene::Rgb,
-    tempering::{Block, Canvas, Combine, Choices, Ladder, Layers, PointGroups, Round, StepMix, Weights},
+    tempering::{Block, Canvas, Choices, Combine, Ladder, Layers, PointGroups, Round, StepMix, Weights},
 };
 
 /// Time that criterion runs each benchmark for before it measures, and while.
@@ -90,8 +92,7 @@ impl Ladders {
     /// Does something with every block in parallel, and empties their splats.
     fn work(&mut self, work: impl Fn(&mut Block<Vec<u32>>, &Canvas, &Round) + Sync) {
         let Ladders { footprint, film, layers, groups, round, blocks } = self;
-        let canvas =
-            Canvas { footprint, size: [FILM; 2], film, unit: 4.0, layers: *layers, probes: None, groups };
+        let canvas = Canvas { footprint, size: [FILM; 2], film, unit: 4.0, layers: *layers, probes: None, groups };
         blocks.par_iter_mut().for_each(|block| {
             work(block, &canvas, round);
             block.deposit(&canvas);

@@ -14,8 +14,8 @@ use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_gr
 use relt::chain::{Evaluator, Recorder, Target};
 use relt::embree::Hits;
 use relt::film::{Accumulator, Footprint, Splats};
-use relt::path::unidirectional::{Mapping, Widths, Workspace};
 use relt::path::Contributions;
+use relt::path::unidirectional::{Mapping, Widths, Workspace};
 use relt::render::calibration::{LANES, calibrate, record_rays};
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{Move, Points, Proposals, StepLaw};

@@ -97,7 +97,8 @@ fn print(scene: &str, method: &str, runs: &[Run], times: usize) {
         values.sort_by(f64::total_cmp);
         values
     };
-    let medians: String = (0..times).map(|i| format!(" {:9.2e}", sorted(&|run| run.errors[i])[runs.len() / 2])).collect();
+    let medians: String =
+        (0..times).map(|i| format!(" {:9.2e}", sorted(&|run| run.errors[i])[runs.len() / 2])).collect();
     let last = sorted(&|run| run.errors[times - 1]);
     let brightness = sorted(&|run| run.brightness);
     let off = sorted(&|run| run.deviation.abs());

@@ -33,10 +33,12 @@ fn refused_in(folder: &Path, options: &[&str], parts: &[&str]) {
 #[test]
 fn senseless_ladders_are_refused() {
     refused(&["--replicas", "0"], &["--replicas 0", "counts the uniform replica"]);
-    refused(&["--replicas", "1"], &["--replicas 1", "--method path"]);
+    refused(&["--uniform-share", "1"], &["--uniform-share 1", "--method path"]);
+    refused(&["--uniform-share", "-0.5"], &["--uniform-share -0.5"]);
+    refused(&["--error", "none"], &["--error", "relative", "absolute"]);
     refused(&["--replicas", "1025"], &["at most 1024"]);
     refused(&["--replicas", "-2"], &["--replicas", "-2"]);
-    refused(&["--replicas", "many"], &["--replicas", "many"]);
+    refused(&["--replicas", "many"], &["--replicas", "many", "auto"]);
     refused(&["--betas", "0,2,1"], &["2 is outside [0, 1]"]);
     refused(&["--betas", "0,-0.5,1"], &["-0.5 is outside [0, 1]"]);
     refused(&["--betas", "0,0.5,0.5,1"], &["0.5 after 0.5 does not rise"]);
@@ -53,6 +55,7 @@ fn a_ladder_needs_replica_exchange() {
     for method in ["path", "mlt"] {
         refused(&["--method", method, "--replicas", "4"], &["--replicas", method, "no ladder"]);
         refused(&["--method", method, "--betas", "0,1"], &["--betas", method, "no ladder"]);
+        refused(&["--method", method, "--layers"], &["--layers", method, "no ladder"]);
         refused(&["--method", method, "--combine", "target"], &["--combine", method, "no ladder"]);
         refused(&["--method", method, "--verbose"], &["--verbose", method, "no ladder"]);
     }
@@ -104,8 +107,8 @@ fn machines_have_limits() {
 #[test]
 fn all_contradictions_are_told_at_once() {
     refused(
-        &["--replicas", "1", "--mpp", "0", "--time", "0s", "--threads", "0", "-D", "a=1", "-D", "a=2"],
-        &["--replicas 1", "--mpp 0", "--time 0s", "--threads 0", "-D a: given more than once"],
+        &["--replicas", "0", "--mpp", "0", "--time", "0s", "--threads", "0", "-D", "a=1", "-D", "a=2"],
+        &["--replicas 0", "--mpp 0", "--time 0s", "--threads 0", "-D a: given more than once"],
     );
 }
 

@@ -1,10 +1,7 @@
 //! States of many chains.
 
 use super::acceptance;
-use crate::{
-    path::Contribution,
-    sample::Points,
-};
+use crate::{path::Contribution, sample::Points};
 
 /// The current states of a batch of chains, each with the expected weight it has gathered and not yet recorded.
 ///

@@ -68,7 +68,11 @@ fn film(film: &FilmDescription) -> Vec<String> {
     };
     vec![
         format!("{} × {} pixels, {filter}", film.width, film.height),
-        format!("memory: {:.1} MiB for path and mlt, {:.1} MiB for re", mebibytes(1), mebibytes(Layers::of(&Choices::default(), 2).count)),
+        format!(
+            "memory: {:.1} MiB for path and mlt, {:.1} MiB for re",
+            mebibytes(1),
+            mebibytes(Layers::of(&Choices::default(), 2).count)
+        ),
     ]
 }
 

@@ -15,8 +15,8 @@ use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, Measure, Method, MltSettings, Normalisation, Observer, Output, PacketChoice, Picture,
-    RunStart, Settings, Status, Summary,
+    self, Combine, Job, LadderChoice, Measure, Method, MltSettings, Normalisation, Observer, Output, PacketChoice,
+    Picture, RunStart, Settings, Status, Summary,
 };
 use crate::tempering::RoundReport;
 

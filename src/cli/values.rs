@@ -38,7 +38,9 @@ pub(super) fn method() -> impl TypedValueParser<Value = Method> {
 pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {
     match text {
         "auto" => Ok(LadderChoice::Auto),
-        _ => text.parse().map(LadderChoice::Replicas).map_err(|_| "accepted are auto and numbers from 1 to 1024".into()),
+        _ => {
+            text.parse().map(LadderChoice::Replicas).map_err(|_| "accepted are auto and numbers from 1 to 1024".into())
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     LadderChoice, Method, MltSettings, Normalisation, Settings,
-    engine::{Counts, Development, Engine, Stage},
+    engine::{Counts, Engine, Stage},
     run::engine,
 };
 use crate::{

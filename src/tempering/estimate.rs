@@ -16,9 +16,6 @@ pub struct Estimate {
     pub relative_error: f64,
 }
 
-/// Combined standard errors by which two estimates may differ before they contradict each other.
-const ALARMING_DIFFERENCE: f64 = 3.0;
-
 impl Estimate {
     /// 0 ± 0: what is said as long as nothing lit has been seen.
     pub const ZERO: Estimate =
@@ -45,24 +42,6 @@ impl Estimate {
         let deviations: f64 = groups.iter().map(|g| (g.0 - value * g.1).powi(2)).sum();
         let standard_error = (deviations * m / (m - 1.0)).sqrt() / n;
         Estimate { value, standard_error, ln_value: libm::log(value), relative_error: standard_error / value }
-    }
-
-    /// Whether the two differ by more than three combined standard errors; `false` where errors are unknown.
-    ///
-    /// For estimates that share samples, such as the uniform mean and MBAR, the combined error √(a² + b²) is too large,
-    /// so that an alarm is rarer than the 0.3 % of independent ones.
-    pub fn contradicts(&self, other: &Estimate) -> bool {
-        let largest = self.ln_value.max(other.ln_value);
-        if largest == f64::NEG_INFINITY {
-            return false;
-        }
-        // in units of the larger, which neither over- nor underflows; an estimate of zero has no error of its own
-        let scaled = |e: &Estimate| {
-            let value = libm::exp(e.ln_value - largest);
-            (value, if value > 0.0 { value * e.relative_error } else { 0.0 })
-        };
-        let ((a, error_a), (b, error_b)) = (scaled(self), scaled(other));
-        (a - b).abs() > ALARMING_DIFFERENCE * error_a.hypot(error_b)
     }
 }
 
@@ -122,17 +101,5 @@ mod tests {
         dark.add(f64::NEG_INFINITY, 5.0);
         assert_eq!(uniform_mean(&[&[dark]]), Estimate::ZERO);
         assert_eq!(Estimate::from_sums(&[]), Estimate::ZERO);
-    }
-
-    #[test]
-    fn estimates_contradict_each_other_beyond_three_combined_errors() {
-        for scale in [0.0, 800.0, -800.0] {
-            let e = |value: f64| Estimate::from_ln(scale + value.ln(), 0.01 / value);
-            // combined error 0.0141, alarm at 0.0424
-            assert!(!e(1.0).contradicts(&e(1.04)) && !e(1.04).contradicts(&e(1.0)));
-            assert!(e(1.0).contradicts(&e(1.045)) && e(1.045).contradicts(&e(1.0)));
-        }
-        assert!(!Estimate::from_ln(0.0, f64::NAN).contradicts(&Estimate::from_ln(5.0, 0.1)));
-        assert!(!Estimate::ZERO.contradicts(&Estimate::ZERO));
     }
 }

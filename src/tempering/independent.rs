@@ -89,8 +89,8 @@ impl<W: Default> Independent<W> {
     ///
     /// What is found in a quarter of a pass, which is spread evenly over the film, hardly depends on which quarter it is,
     /// so groups differ by the noise within pixels, as the image does. Groups made of blocks would differ by the pixels
-    /// that they happened to visit: on `cornell-box` at 64 points a pixel the error of the mean was told four times too
-    /// large.
+    /// that they happened to visit: on `cornell-box` at 64 points a pixel the mean was told with an error of 1.25 % in the
+    /// place of 0.23 %.
     fn group(&self, next: u64) -> usize {
         let (pass, place) = (next / self.pixels, next % self.pixels);
         let quarter = place * QUARTERS / self.pixels;

@@ -139,7 +139,10 @@ impl Probes {
     /// both halves.
     pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
         let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(ratio));
-        a.into_iter().zip(b).map(|(a, b)| [a, b].map(|[uniform, tempered, squares, n]| [uniform, tempered, n, squares])).collect()
+        a.into_iter()
+            .zip(b)
+            .map(|(a, b)| [a, b].map(|[uniform, tempered, squares, n]| [uniform, tempered, n, squares]))
+            .collect()
     }
 }
 

@@ -103,7 +103,8 @@ impl Measured {
     /// neighbours: were a probe's own value to count, a sample that is much too bright would excuse itself.
     fn importances(&self) -> Vec<f64> {
         // not known, NaN, where no uniform point fell
-        let luminance = |[a, b]: &[[f64; 4]; 2]| (a[0] + b[0]) / (a[2] + b[2]) + 0.5 * (a[1] + b[1]) * self.tempered_scale;
+        let luminance =
+            |[a, b]: &[[f64; 4]; 2]| (a[0] + b[0]) / (a[2] + b[2]) + 0.5 * (a[1] + b[1]) * self.tempered_scale;
         let luminances: Vec<f64> = self.probes[EVEN].iter().map(luminance).collect();
         let reach = NEIGHBOURS / 2;
         (0..luminances.len())
@@ -119,7 +120,10 @@ impl Measured {
 
     /// Images of the two halves of a probe: from uniform points, and from states.
     fn parts(&self, halves: &[[f64; 4]; 2]) -> [[f64; 2]; 2] {
-        [halves.map(|[uniform, _, points, _]| uniform / points), halves.map(|[_, states, ..]| states * self.tempered_scale)]
+        [
+            halves.map(|[uniform, _, points, _]| uniform / points),
+            halves.map(|[_, states, ..]| states * self.tempered_scale),
+        ]
     }
 
     /// How much larger the mean square of what a uniform point adds is than uniform points alone have shown: chains find

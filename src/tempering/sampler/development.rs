@@ -122,8 +122,14 @@ impl<W: Default + Send> Planes<'_, W> {
     fn layers(&self) -> Vec<(String, Plane)> {
         let on = &self.sampler.screen.layers;
         let [hot, tempered] = [on.hot, on.tempered].map(|layer| self.sums(layer));
-        let main = hot.clone().or_else(|| self.sums(on.even)).or_else(|| self.sums(on.uniform)).or_else(|| self.sums(on.target)).unwrap_or_default();
-        let density = main.iter().enumerate().map(|(i, sums)| (sums[3] + tempered.as_ref().map_or(0.0, |t| t[i][3])) as f32);
+        let main = hot
+            .clone()
+            .or_else(|| self.sums(on.even))
+            .or_else(|| self.sums(on.uniform))
+            .or_else(|| self.sums(on.target))
+            .unwrap_or_default();
+        let density =
+            main.iter().enumerate().map(|(i, sums)| (sums[3] + tempered.as_ref().map_or(0.0, |t| t[i][3])) as f32);
         let mut layers = vec![("density".to_owned(), Plane::Gray(density.collect()))];
         if !self.sampler.choices.layers || hot.is_none() {
             return layers;
@@ -139,7 +145,8 @@ impl<W: Default + Send> Planes<'_, W> {
         let scale = self.tempered_scale();
         for k in 1..self.sampler.round.ladder.rungs() {
             let sums = self.sums(on.rungs.map(|first| first + k - 1)).unwrap_or_default();
-            layers.push((format!("rung{}", k + 1), Plane::Rgb(self.image(|i| [0, 1, 2].map(|ch| sums[i][ch] * scale)))));
+            layers
+                .push((format!("rung{}", k + 1), Plane::Rgb(self.image(|i| [0, 1, 2].map(|ch| sums[i][ch] * scale)))));
         }
         layers
     }

@@ -33,7 +33,7 @@ impl Learnt {
     /// Says when the two estimates of c contradict each other: what the chains do not find, MBAR does not count.
     pub fn warnings(&self) -> Vec<String> {
         let (uniform, mbar) = (self.uniform, self.normalisers.target);
-        if !uniform.contradicts(&mbar) {
+        if self.normalisers.disagreement.is_nan() || self.normalisers.disagreement <= ALARMING {
             return Vec::new();
         }
         vec![format!(
@@ -43,6 +43,9 @@ impl Learnt {
         )]
     }
 }
+
+/// Standard errors of their difference by which the uniform mean and MBAR may differ.
+const ALARMING: f64 = 3.0;
 
 /// Where the mean luminance of the image comes from.
 pub(super) enum Luminance {

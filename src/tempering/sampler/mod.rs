@@ -20,8 +20,12 @@ pub use learnt::Learnt;
 use learnt::Luminance;
 
 use super::{
-    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round, RoundReport, Sum,
-    Tally, Weights, independent::Independent, probes::TRIALS, steps::{self, StepCount}, tuning::Choice,
+    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round,
+    RoundReport, Sum, Tally, Weights,
+    independent::Independent,
+    probes::TRIALS,
+    steps::{self, StepCount},
+    tuning::Choice,
 };
 use crate::{
     chain::{Importance, Measure, Plan, Start, Target},
@@ -32,6 +36,11 @@ use crate::{
 /// Uniform points before chains start, and before that where it is to be learnt where chains are wanted; a 32nd of the
 /// run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
+/// Ladders longer than 64 rungs get fewer blocks, with no more rungs together than this: each block has histograms for
+/// each rung, of some ten kilobytes.
+const RUNGS_OF_ALL_BLOCKS: usize = 4096;
+/// Groups from which standard errors are taken are the blocks: never fewer.
+const FEWEST_BLOCKS: usize = 8;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
 
@@ -79,7 +88,6 @@ pub struct Sampler<W> {
     reports: Vec<RoundReport>,
 }
 
-
 /// The film and all that belongs to it.
 struct Screen {
     footprint: Footprint,
@@ -126,7 +134,6 @@ struct Schedule {
     learning: u64,
 }
 
-
 /// What a run of replica exchange is about, beside what is sampled.
 pub struct Setup {
     /// Random numbers.
@@ -147,12 +154,13 @@ impl<W: Default + Send> Sampler<W> {
     /// Ready to start.
     pub fn new(setup: Setup) -> Sampler<W> {
         let Setup { rng, choices, footprint, size, unit, evaluations } = setup;
-        let plan = Plan::new(evaluations, 1);
         let most_rungs = match &choices.ladder {
             LadderChoice::Auto => MOST_AUTOMATIC,
             LadderChoice::Replicas(k) => *k as usize,
             LadderChoice::Betas(betas) => betas.len(),
         };
+        let mut plan = Plan::new(evaluations, 1);
+        plan.blocks = plan.blocks.min((RUNGS_OF_ALL_BLOCKS / most_rungs).max(FEWEST_BLOCKS) & !1); // halves are compared
         let layers = Layers::of(&choices, most_rungs);
         let map = ProbeMap::new(size);
         let learns = choices.combine == Combine::Balance && most_rungs > 1;
@@ -178,7 +186,8 @@ impl<W: Default + Send> Sampler<W> {
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
         let only_uniform = most_rungs == 1;
-        let length = if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
+        let length =
+            if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
         Sampler {
             rng,
             screen,
@@ -240,7 +249,8 @@ impl<W: Default + Send> Sampler<W> {
             if self.schedule.done == self.schedule.length {
                 self.end_round(target);
             }
-            let stop = if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
+            let stop =
+                if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
             let now = sweeps.min(stop - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
             self.work(target, now);
             sweeps -= now;

@@ -2,8 +2,8 @@
 
 use super::{Learnt, Sampler};
 use crate::tempering::{
-    Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport, steps,
-    probes::TRIALS, trips::Dwell,
+    Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport,
+    probes::TRIALS, steps, trips::Dwell,
 };
 
 /// β at which the local barrier is told.
@@ -102,7 +102,8 @@ impl<W: Default + Send> Sampler<W> {
                 let points = self.schedule.done * (self.portions.len() * self.points_a_block()) as u64;
                 let dwell = self.dwell(k);
                 let lineage = (dwell.sum > 0).then(|| dwell.squares as f64 / dwell.sum as f64);
-                let accepted: f64 = counts[k].steps.iter().filter(|c| c.proposed > 0).map(|c| c.acceptance() * c.proposed as f64).sum();
+                let accepted: f64 =
+                    counts[k].steps.iter().filter(|c| c.proposed > 0).map(|c| c.acceptance() * c.proposed as f64).sum();
                 let (mean_ln_g, sd_ln_g) = seen[k].mean_and_sd().unwrap_or((f64::NAN, f64::NAN));
                 let evaluations = if k == 0 { points } else { proposed };
                 RungReport {

@@ -76,7 +76,8 @@ impl<W: Default + Send> Sampler<W> {
             _ => self.adapt(&learnt),
         };
         report.choices = choices;
-        report.image_share_before = self.schedule.frozen.then(|| self.schedule.learning as f64 / self.evaluations as f64);
+        report.image_share_before =
+            self.schedule.frozen.then(|| self.schedule.learning as f64 / self.evaluations as f64);
         self.reports.push(report);
         self.begin_round(&learnt);
     }
@@ -135,7 +136,9 @@ impl<W: Default + Send> Sampler<W> {
         }
         let layers = &self.screen.layers;
         let luminance = match (layers.hot, layers.even) {
-            (Some(_), _) => Luminance::Balanced { hot: estimate(&hot), tempered: estimate(&tempered), ln_unit: self.ln_unit },
+            (Some(_), _) => {
+                Luminance::Balanced { hot: estimate(&hot), tempered: estimate(&tempered), ln_unit: self.ln_unit }
+            }
             (None, Some(_)) => Luminance::Mean(estimate(&even)),
             (None, None) => Luminance::Normaliser,
         };
@@ -169,7 +172,8 @@ impl<W: Default + Send> Sampler<W> {
         self.offers = 1;
         let remaining = self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations));
         let ladders = self.plan.groups_a_block(remaining, 2 * chains);
-        let samples: Vec<Start> = self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
+        let samples: Vec<Start> =
+            self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
         let all = ladders * self.portions.len();
         let starts: Vec<Vec<Start>> = ladder.betas()[1..]
             .par_iter()
@@ -190,11 +194,8 @@ impl<W: Default + Send> Sampler<W> {
         self.screen.layers = self.screen.prepared;
         self.bootstrap = self.points[0];
         self.rays_a_point = self.rays as f64 / self.evaluations as f64;
-        self.choice = Choice {
-            ratio: FIRST_RATIO,
-            share: self.choices.uniform_share.unwrap_or(0.5),
-            relative_error: f64::NAN,
-        };
+        self.choice =
+            Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
             LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
@@ -220,7 +221,8 @@ impl<W: Default + Send> Sampler<W> {
                 0.0 => "path tracing: no share of chains makes the error less".into(),
                 ratio => format!(
                     "{:.0} % uniform points, a state counts for {ratio} of one: {:.2} times the error of path tracing",
-                    100.0 * choice.share, choice.relative_error
+                    100.0 * choice.share,
+                    choice.relative_error
                 ),
             });
         }
@@ -247,7 +249,8 @@ impl<W: Default + Send> Sampler<W> {
     /// Shifts the sizes of steps where the trials show that this pays.
     fn choose_steps(&mut self, learnt: &Learnt) -> Option<String> {
         let (probes, measured) = (self.screen.probes.as_ref()?, self.measured(learnt)?);
-        let blocks = |trial| self.portions.iter().flat_map(|p| &p.ladders).filter(|block| block.trial() == trial).count();
+        let blocks =
+            |trial| self.portions.iter().flat_map(|p| &p.ladders).filter(|block| block.trial() == trial).count();
         // a sum of n blocks has √n times the noise of one
         let noise: [f64; TRIALS] =
             std::array::from_fn(|trial| measured.noise(&probes.trial(trial)) / (blocks(trial) as f64).sqrt());
