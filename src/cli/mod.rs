@@ -23,7 +23,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(render::Render),
+    Render(Box<render::Render>),
     Info(info::Info),
     Ladder(ladder::Ladder),
 }
@@ -46,7 +46,7 @@ pub fn main() -> ExitCode {
         }
     };
     let done = match arguments.command {
-        Command::Render(arguments) => render::run(arguments),
+        Command::Render(arguments) => render::run(*arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
     };

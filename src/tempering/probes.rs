@@ -45,7 +45,7 @@ impl ProbeMap {
     }
 
     /// Number of probes.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.pixels.div_ceil(self.stride) as usize
     }
 
@@ -70,7 +70,7 @@ pub struct Probes {
 impl Probes {
     /// Empty probes; `unit` as for the film.
     pub fn new(map: &ProbeMap, unit: f64) -> Probes {
-        let film = |layers: usize| [(); 2].map(|()| Accumulator::new(map.len() as u32, 1, layers, unit));
+        let film = |layers: usize| [(); 2].map(|()| Accumulator::new(map.count() as u32, 1, layers, unit));
         Probes { halves: film(2 * RATIOS.len()), trials: [(); TRIALS].map(|()| film(1)) }
     }
 
@@ -155,9 +155,9 @@ mod tests {
         for size in [[1, 1], [128, 1], [256, 256], [1920, 1080], [1, 70000], [4096, 4096]] {
             let map = ProbeMap::new(size);
             let pixels = size[0] * size[1];
-            assert!(map.len() <= MOST_PROBES.max(1) && map.len() >= (pixels as usize).min(MOST_PROBES) / 4, "{size:?}");
+            assert!(map.count() <= MOST_PROBES.max(1) && map.count() >= (pixels as usize).min(MOST_PROBES) / 4, "{size:?}");
             let mut columns = vec![0; size[0] as usize];
-            for probe in 0..map.len() {
+            for probe in 0..map.count() {
                 let pixel = map.pixel(probe);
                 assert_eq!(map.of_pixel(pixel as u32), Some(probe as u32));
                 columns[pixel % size[0] as usize] += 1;
