@@ -60,7 +60,7 @@ fn a_ladder_needs_replica_exchange() {
         refused(&["--method", method, "--verbose"], &["--verbose", method, "no ladder"]);
     }
     refused(&["--method", "magic"], &["magic", "path", "mlt", "re"]);
-    refused(&["--combine", "median"], &["median", "target", "balance"]);
+    refused(&["--combine", "mean"], &["median", "target", "balance"]);
 }
 
 #[test]
@@ -166,8 +166,9 @@ fn help_tells_exit_codes_defaults_and_units() {
     let folder = tempfile::tempdir().unwrap();
     let output = relt(folder.path(), &["render", "--help"]);
     assert_eq!(output.status.code(), Some(0));
-    let text = String::from_utf8(output.stdout).unwrap();
-    for part in ["Exit codes:", "[default: 3]", "[possible values: path, mlt, re]", "60s", "130"] {
+    // lines are broken where the window ends
+    let text = String::from_utf8(output.stdout).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in ["Exit codes:", "[default: auto]", "[possible values: path, mlt, re]", "60s", "130"] {
         assert!(text.contains(part), "{part:?} is not in:\n{text}");
     }
     assert_eq!(relt(folder.path(), &["--version"]).status.code(), Some(0));

@@ -155,7 +155,10 @@ mod tests {
         for size in [[1, 1], [128, 1], [256, 256], [1920, 1080], [1, 70000], [4096, 4096]] {
             let map = ProbeMap::new(size);
             let pixels = size[0] * size[1];
-            assert!(map.count() <= MOST_PROBES.max(1) && map.count() >= (pixels as usize).min(MOST_PROBES) / 4, "{size:?}");
+            assert!(
+                map.count() <= MOST_PROBES.max(1) && map.count() >= (pixels as usize).min(MOST_PROBES) / 4,
+                "{size:?}"
+            );
             let mut columns = vec![0; size[0] as usize];
             for probe in 0..map.count() {
                 let pixel = map.pixel(probe);
