@@ -61,7 +61,8 @@ impl ProbeMap {
     }
 }
 
-/// Luminance gathered by the probes in each half of the blocks, one layer for each of [`RATIOS`], and as many for squares.
+/// Luminance gathered by the probes in each half of the blocks, one layer for each ratio that is tried, and as many for
+/// squares.
 pub struct Probes {
     halves: [Accumulator; 2],
     trials: [[Accumulator; 2]; TRIALS],
