@@ -6,6 +6,7 @@
 //! allow for that.
 
 use std::hint::black_box;
+use std::time::Instant;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
@@ -20,12 +21,10 @@ use relt::scene::Scene;
 
 mod support;
 
-/// Sweeps before the measurement: past the independent samples that chains start from, which take 8, and so many
-/// that hardly a round begins within it.
-const WARM_START: u64 = 32;
-/// Sweeps that are measured at a time, as in a slice of the render loop: splats are deposited at its end. So many that
-/// `path`, which takes pixels in their order, goes through whole pictures.
-const SWEEPS: u64 = 4;
+/// Mutations before the measurement: past the rounds in which replica exchange learns.
+const WARM_START: u64 = 9 << 20;
+/// Mutations that are measured at a time, about those of a slice of the render loop: splats are deposited at its end.
+const SLICE: u64 = 1 << 17;
 /// Batches of paths whose rays are recorded.
 const BATCHES: u64 = 64;
 
@@ -60,25 +59,39 @@ fn method(group: &mut BenchmarkGroup<WallTime>, name: &str, settings: &Settings,
         rng: Rng::new(settings.seed),
     };
     let mut engine = render::engine(&stage, settings, None);
-    let at_start = engine.counts().mutations;
-    engine.advance(&stage, 1);
-    let a_sweep = engine.counts().mutations - at_start;
-    group.throughput(Throughput::Elements(SWEEPS * a_sweep));
+    group.throughput(Throughput::Elements(SLICE));
     let mut cold = true;
     group.bench_function(name, |bencher| {
         if std::mem::take(&mut cold) {
             warm_up(engine.as_mut(), &stage, name);
         }
-        bencher.iter(|| engine.advance(&stage, SWEEPS));
+        // sweeps differ in length from round to round: the time of those that were done, scaled to those asked for
+        bencher.iter_custom(|slices| {
+            let begin = Instant::now();
+            let done = work(engine.as_mut(), &stage, slices * SLICE);
+            begin.elapsed().mul_f64((slices * SLICE) as f64 / done as f64)
+        });
     });
+}
+
+/// Goes through at least so many mutations, and tells how many they were.
+fn work(engine: &mut dyn Engine, stage: &Stage, mutations: u64) -> u64 {
+    let begin = engine.counts().mutations;
+    loop {
+        engine.advance(stage, 1);
+        let done = engine.counts().mutations - begin;
+        if done >= mutations {
+            return done;
+        }
+    }
 }
 
 fn warm_up(engine: &mut dyn Engine, stage: &Stage, name: &str) {
     if !is_smoke_test() {
-        engine.advance(stage, WARM_START);
+        work(engine, stage, WARM_START);
     }
     let before = engine.counts();
-    engine.advance(stage, SWEEPS);
+    work(engine, stage, SLICE);
     let after = engine.counts();
     println!("{name}: {:.2} rays a mutation", ratio(after.rays - before.rays, after.mutations - before.mutations));
 }
