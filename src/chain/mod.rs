@@ -12,7 +12,7 @@ mod walkers;
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, baseline_layer};
 pub use importance::{Importance, Measure};
 pub use metropolis::acceptance;
-pub use plan::Plan;
+pub use plan::{FEWEST_BLOCKS, Plan};
 pub use recorder::Recorder;
 pub use start::{Start, replay, resample};
 pub use target::{Evaluator, Target};

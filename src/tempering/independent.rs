@@ -50,8 +50,7 @@ impl<W: Default> Independent<W> {
         }
     }
 
-    /// Evaluates and records the block's next `points` points; all blocks are asked for as many.
-    ///
+    /// Evaluates and records the block's next `points` points; all blocks are asked for as many. `keep` is told of each.
     pub fn sweep<T: Target<Workspace = W>>(
         &mut self,
         target: &T,

@@ -98,11 +98,16 @@ pub struct Sum {
     weight: u128,
 }
 
+/// 2⁶⁰.
+const LUMINANCE_STEPS: f64 = (1u64 << 60) as f64;
+/// 2²⁰.
+const WEIGHT_STEPS: f64 = (1u64 << 20) as f64;
+
 impl Sum {
     #[inline(always)]
     fn add(&mut self, luminance: f64, weight: f64) {
-        self.luminance = self.luminance.saturating_add((luminance * 1_152_921_504_606_846_976.0) as i128);
-        self.weight += (weight * 1_048_576.0 + 0.5) as u128;
+        self.luminance = self.luminance.saturating_add((luminance * LUMINANCE_STEPS) as i128);
+        self.weight += (weight * WEIGHT_STEPS + 0.5) as u128;
     }
 
     /// Adds another sum.
@@ -113,7 +118,7 @@ impl Sum {
 
     /// Luminance, in the film's unit, and weight.
     pub fn values(self) -> (f64, f64) {
-        (self.luminance as f64 / 1_152_921_504_606_846_976.0, self.weight as f64 / 1_048_576.0)
+        (self.luminance as f64 / LUMINANCE_STEPS, self.weight as f64 / WEIGHT_STEPS)
     }
 }
 

@@ -28,7 +28,7 @@ use super::{
     tuning::Choice,
 };
 use crate::{
-    chain::{Importance, Measure, Plan, Start, Target},
+    chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target},
     film::{Accumulator, Footprint},
     rng::Rng,
 };
@@ -39,8 +39,6 @@ const BOOTSTRAP: u64 = 1 << 17;
 /// Ladders longer than 64 rungs get fewer blocks, with no more rungs together than this: each block has histograms for
 /// each rung, of some ten kilobytes.
 const RUNGS_OF_ALL_BLOCKS: usize = 4096;
-/// Groups from which standard errors are taken are the blocks: never fewer.
-const FEWEST_BLOCKS: usize = 8;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
 
