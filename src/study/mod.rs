@@ -2,5 +2,7 @@
 
 pub mod ladder_page;
 pub mod ladder_text;
+pub mod metrics;
+pub mod results;
 pub mod run_log;
 mod svg;
