@@ -78,7 +78,7 @@ fn method(group: &mut BenchmarkGroup<WallTime>, name: &str, settings: &Settings,
 fn work(engine: &mut dyn Engine, stage: &Stage, mutations: u64) -> u64 {
     let begin = engine.counts().mutations;
     loop {
-        engine.advance(stage, 1);
+        engine.advance(stage, 1, None);
         let done = engine.counts().mutations - begin;
         if done >= mutations {
             return done;

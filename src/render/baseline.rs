@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Stage, film_warnings, mean},
+    engine::{Counts, Development, Engine, Phase, Stage, film_warnings, mean},
     settings::{MltSettings, Normalisation},
 };
 use crate::{
@@ -146,13 +146,21 @@ impl Engine for Mlt {
         sweeps.map(|s| s * self.plan.a_sweep() + self.bootstrap_samples)
     }
 
-    fn advance(&mut self, stage: &Stage, sweeps: u64) {
-        let sweeps = sweeps.min(self.sweeps_left().unwrap_or(u64::MAX));
+    fn advance(&mut self, stage: &Stage, sweeps: u64, until: Option<u64>) -> u64 {
+        let done = self.bootstrap_samples + self.blocks.first().map_or(0, |b| b.chains.steps()) * self.plan.a_sweep();
+        let short = until.map_or(u64::MAX, |until| until.saturating_sub(done).div_ceil(self.plan.a_sweep()));
+        let sweeps = sweeps.min(self.sweeps_left().unwrap_or(u64::MAX)).min(short);
         let (film, unit) = (&self.film, self.unit());
         self.blocks.par_iter_mut().for_each(|block| {
             block.chains.advance(&stage.mapping, sweeps, unit, &mut stage.recorder(&mut block.splats));
             film.deposit(&mut block.splats);
         });
+        if self.blocks.is_empty() { 0 } else { sweeps }
+    }
+
+    /// The first pass is over when the method is made.
+    fn phase(&self) -> Phase {
+        Phase::Steady
     }
 
     fn counts(&self) -> Counts {

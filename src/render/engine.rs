@@ -8,6 +8,8 @@ use crate::{
     tempering::{Estimate, RoundReport},
 };
 
+pub use super::status::Phase;
+
 /// What all blocks of a run share.
 pub struct Stage<'s> {
     /// From primary samples to contributions.
@@ -85,8 +87,12 @@ pub trait Engine: Send {
     fn sweeps_left(&self) -> Option<u64>;
     /// Evaluations that the whole run takes, where it is limited.
     fn mutations_wanted(&self) -> Option<u64>;
-    /// Goes through `sweeps` more sweeps, or those left, in parallel over blocks on the current thread pool.
-    fn advance(&mut self, stage: &Stage, sweeps: u64);
+    /// Goes through `sweeps` more sweeps, or those left, in parallel over blocks on the current thread pool; through
+    /// fewer where the first end of a sweep with `until` mutations done, or the end of a phase, comes before.
+    /// Returns how many they were; none where a phase ends before the first.
+    fn advance(&mut self, stage: &Stage, sweeps: u64, until: Option<u64>) -> u64;
+    /// What the next sweep belongs to.
+    fn phase(&self) -> Phase;
     /// Counts so far.
     fn counts(&self) -> Counts;
     /// The picture so far; changes nothing.

@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod calibration;
+pub mod clock;
 pub mod engine;
 pub mod log;
 pub mod output;
@@ -16,4 +17,4 @@ mod tests;
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};
 pub use settings::{Combine, LadderChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings};
-pub use status::{Observer, RunStart, Status, Summary};
+pub use status::{Observer, RunStart, SetUp, Status, Stop, Summary};

@@ -1,13 +1,13 @@
 //! `re` and `path`: replica exchange on the light paths of a scene, and its uniform rung alone.
 
 use super::{
-    engine::{Counts, Development, Engine, Stage, film_warnings},
+    engine::{Counts, Development, Engine, Phase, Stage, film_warnings},
     settings::{Method, Settings},
 };
 use crate::{
     film::Footprint,
     path::unidirectional::Workspace,
-    tempering::{Choices, LadderChoice, RoundReport, Sampler, Setup},
+    tempering::{Choices, LadderChoice, Learning, RoundReport, Sampler, Setup},
 };
 
 /// The method at work.
@@ -44,8 +44,16 @@ impl Engine for ReplicaExchange {
         self.sampler.evaluations_wanted()
     }
 
-    fn advance(&mut self, stage: &Stage, sweeps: u64) {
-        self.sampler.advance(&stage.mapping, sweeps);
+    fn advance(&mut self, stage: &Stage, sweeps: u64, until: Option<u64>) -> u64 {
+        self.sampler.advance(&stage.mapping, sweeps, until)
+    }
+
+    fn phase(&self) -> Phase {
+        match self.sampler.learning() {
+            Learning::Bootstrap => Phase::Bootstrap,
+            Learning::Rounds => Phase::Adaptation,
+            Learning::Over => Phase::Steady,
+        }
     }
 
     fn counts(&self) -> Counts {

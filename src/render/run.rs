@@ -5,17 +5,18 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use super::{
     baseline::Mlt,
     calibration,
-    engine::{Engine, Stage},
+    clock::Clock,
+    engine::{Engine, Phase, Stage},
     output::{Picture, metadata},
     replica_exchange::ReplicaExchange,
     settings::{Method, PacketChoice, Settings},
-    status::{Observer, Packets, RunStart, Status},
+    status::{Observer, Packets, RunStart, SetUp, Status, Stop},
 };
 use crate::{
     film::Footprint,
@@ -65,10 +66,12 @@ pub enum RenderError {
 /// How long a slice of sweeps should take: often enough for progress, snapshots and Ctrl-C, and long beside the
 /// moment at its end when threads wait for the last of them.
 const SLICE: Duration = Duration::from_millis(200);
+/// What a slice is cut to, at the least, where a look is due.
+const SHORTEST_SLICE: Duration = Duration::from_millis(2);
 
 /// Renders a job and tells `observer` how it goes.
 pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
-    let begin = Instant::now();
+    let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
     let widths = match job.settings.packet {
@@ -83,13 +86,24 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     };
     let start = run_start(job, threads, widths);
     observer.started(&start);
-    let (mut engine, end) = pool.install(|| {
+    let mut watch = Watch { clock, set_up: SetUp::default(), last_round: None };
+    watch.set_up.calibration = watch.clock.elapsed();
+    let (mut engine, interrupted) = pool.install(|| {
         let mutations = job.settings.mutations_per_pixel.map(|mpp| (mpp * stage.pixels() as f64).ceil() as u64);
         let mut engine = engine(&stage, &job.settings, mutations);
-        let end = work(job, &stage, engine.as_mut(), &start, observer, begin);
-        (engine, end)
+        watch.set_up.bootstrap = watch.clock.elapsed() - watch.set_up.calibration;
+        let interrupted = work(job, &stage, engine.as_mut(), &start, observer, &mut watch);
+        (engine, interrupted)
     });
-    Ok(conclude(job, &stage, engine.as_mut(), &start, end, begin))
+    Ok(conclude(job, &stage, engine.as_mut(), &start, &watch, interrupted))
+}
+
+/// What the render loop keeps about a run's course.
+struct Watch {
+    clock: Clock,
+    set_up: SetUp,
+    /// The last round that is over.
+    last_round: Option<Arc<RoundReport>>,
 }
 
 fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
@@ -110,62 +124,73 @@ pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box
     }
 }
 
-/// How the work came to an end.
-struct End {
-    /// It was stopped before its budget was spent.
-    interrupted: bool,
-    /// The last round that was over by then.
-    last_round: Option<Arc<RoundReport>>,
-}
-
-/// Slice after slice until a budget is spent or the run is stopped.
+/// Slice after slice until a budget is spent or the run is stopped from outside, which is what it returns.
 fn work(
     job: &Job,
     stage: &Stage,
     engine: &mut dyn Engine,
     start: &RunStart,
     observer: &dyn Observer,
-    begin: Instant,
-) -> End {
-    let mut last_round = None;
+    watch: &mut Watch,
+) -> bool {
     let mut slice = 1;
     loop {
         let left = engine.sweeps_left().unwrap_or(u64::MAX);
-        let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(begin.elapsed()));
+        let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(watch.clock.elapsed()));
         if left == 0 || time_left.is_zero() {
-            return End { interrupted: false, last_round };
+            return false;
         }
         if job.stop.load(Ordering::Relaxed) {
-            return End { interrupted: true, last_round };
+            return true;
         }
-        let slice_begin = Instant::now();
-        let sweeps = slice.min(left);
-        engine.advance(stage, sweeps);
-        // the next slice fills its time, or what is left of the run's
-        let a_sweep = slice_begin.elapsed().as_secs_f64() / sweeps as f64;
-        let next = SLICE.min(job.settings.time.map_or(SLICE, |time| time.saturating_sub(begin.elapsed())));
-        slice = ((next.as_secs_f64() / a_sweep) as u64).clamp(1, 2 * slice);
+        let (until, look_in) = match observer.next_stop() {
+            Some(Stop::Mutations(mutations)) if mutations > engine.counts().mutations => {
+                (Some(mutations), Duration::MAX)
+            }
+            Some(Stop::Time(time)) => (None, time.saturating_sub(watch.clock.elapsed())),
+            _ => (None, Duration::MAX),
+        };
+        let (phase, slice_begin) = (engine.phase(), watch.clock.elapsed());
+        let sweeps = engine.advance(stage, slice.min(left), until);
+        let took = watch.clock.elapsed() - slice_begin;
+        match phase {
+            Phase::Bootstrap => watch.set_up.bootstrap += took,
+            Phase::Adaptation => watch.set_up.adaptation += took,
+            Phase::Steady => {}
+        }
+        // the next slice fills its time, or what is left until the next look or of the run's time
+        let time_left = job.settings.time.map_or(SLICE, |time| time.saturating_sub(watch.clock.elapsed()));
+        let next = SLICE.min(time_left).min(look_in.saturating_sub(took).max(SHORTEST_SLICE));
+        if sweeps > 0 {
+            let a_sweep = took.as_secs_f64() / sweeps as f64;
+            slice = ((next.as_secs_f64() / a_sweep) as u64).clamp(1, 2 * slice);
+        }
 
         let rounds: Vec<_> = engine.take_reports().into_iter().map(Arc::new).collect();
-        last_round = rounds.last().cloned().or(last_round);
-        let status = status(job, engine, last_round.clone(), begin);
+        watch.last_round = rounds.last().or(watch.last_round.as_ref()).cloned();
+        let status = status(job, engine, watch);
         observer.progress(&status);
         rounds.iter().for_each(|round| observer.round(round));
         if observer.wants_picture(&status) {
-            let development = engine.develop(stage);
-            let status =
-                Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
-            let metadata = metadata(start, &status);
-            let picture = Picture { image: development.image, layers: development.layers, metadata };
-            observer.snapshot(&status, &picture);
+            let look = || {
+                let development = engine.develop(stage);
+                let normalisation = development.normalisation.map(|e| (e.value, e.standard_error));
+                let status = Status { normalisation, ..status.clone() };
+                let metadata = metadata(start, &status);
+                let picture = Picture { image: development.image, layers: development.layers, metadata };
+                observer.snapshot(&status, &picture);
+            };
+            if observer.stops_the_clock() { watch.clock.pause(look) } else { look() }
         }
     }
 }
 
-fn status(job: &Job, engine: &dyn Engine, last_round: Option<Arc<RoundReport>>, begin: Instant) -> Status {
+fn status(job: &Job, engine: &dyn Engine, watch: &Watch) -> Status {
     let counts = engine.counts();
     Status {
-        elapsed: begin.elapsed(),
+        elapsed: watch.clock.elapsed(),
+        cpu: watch.clock.cpu(),
+        set_up: watch.set_up,
         mutations: counts.mutations,
         target_mutations: engine.mutations_wanted(),
         time_budget: job.settings.time,
@@ -174,12 +199,19 @@ fn status(job: &Job, engine: &dyn Engine, last_round: Option<Arc<RoundReport>>, 
         swap: counts.swap,
         non_finite: counts.non_finite,
         normalisation: None,
-        last_round,
+        last_round: watch.last_round.clone(),
     }
 }
 
-fn conclude(job: &Job, stage: &Stage, engine: &mut dyn Engine, start: &RunStart, end: End, begin: Instant) -> Outcome {
-    let status = status(job, engine, end.last_round, begin);
+fn conclude(
+    job: &Job,
+    stage: &Stage,
+    engine: &mut dyn Engine,
+    start: &RunStart,
+    watch: &Watch,
+    interrupted: bool,
+) -> Outcome {
+    let status = status(job, engine, watch);
     let development = engine.develop(stage);
     let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
     let mut warnings = development.warnings;
@@ -195,7 +227,7 @@ fn conclude(job: &Job, stage: &Stage, engine: &mut dyn Engine, start: &RunStart,
         ));
     }
     let picture = Picture { image: development.image, layers: development.layers, metadata: metadata(start, &status) };
-    Outcome { picture, status, interrupted: end.interrupted, warnings }
+    Outcome { picture, status, interrupted, warnings }
 }
 
 fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
@@ -245,12 +277,17 @@ mod tests {
             Some(3)
         }
 
-        fn advance(&mut self, _: &Stage, sweeps: u64) {
+        fn advance(&mut self, _: &Stage, sweeps: u64, _: Option<u64>) -> u64 {
             for sweep in self.sweeps..self.sweeps + sweeps {
                 let ended = [&[0, 1][..], &[2], &[]][sweep as usize];
                 self.reports.extend(ended.iter().map(|&round| RoundReport { round, ..RoundReport::default() }));
             }
             self.sweeps += sweeps;
+            sweeps
+        }
+
+        fn phase(&self) -> Phase {
+            if self.sweeps == 0 { Phase::Bootstrap } else { Phase::Steady }
         }
 
         fn counts(&self) -> Counts {
@@ -298,11 +335,12 @@ mod tests {
         };
         let (mut engine, start) = (Rounds { sweeps: 0, reports: Vec::new() }, RunStart::default());
         let notes = Notes::default();
-        let end = work(&job, &stage, &mut engine, &start, &notes, Instant::now());
+        let mut watch = Watch { clock: Clock::start(), set_up: SetUp::default(), last_round: None };
+        assert!(!work(&job, &stage, &mut engine, &start, &notes, &mut watch));
         assert_eq!(*notes.rounds.lock().unwrap(), [0, 1, 2]);
         let last = notes.last.lock().unwrap();
         assert_eq!((last.first(), last.last()), (Some(&Some(1)), Some(&Some(2))), "{last:?}");
-        let outcome = conclude(&job, &stage, &mut engine, &start, end, Instant::now());
+        let outcome = conclude(&job, &stage, &mut engine, &start, &watch, false);
         assert!(
             outcome.picture.metadata.contains(&("ladder.round".into(), 2.0.into())),
             "{:?}",

@@ -49,8 +49,12 @@ pub struct Packets {
 /// Where a run stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
-    /// Wall time since rendering began.
+    /// Wall time since rendering began, without pauses ([`Observer::stops_the_clock`]).
     pub elapsed: Duration,
+    /// Processor time of all threads of the process in the same span; `None` where the system does not tell.
+    pub cpu: Option<Duration>,
+    /// The part of `elapsed` before the run worked at full pace.
+    pub set_up: SetUp,
     /// Mutations done, independent samples included.
     pub mutations: u64,
     /// Mutations to do, where that is a budget.
@@ -69,6 +73,37 @@ pub struct Status {
     pub normalisation: Option<(f64, f64)>,
     /// The last round that ended; absent before that, and for methods without rounds.
     pub last_round: Option<Arc<RoundReport>>,
+}
+
+/// Wall time of a run before it works at full pace.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SetUp {
+    /// Starting threads and measuring packet widths.
+    pub calibration: Duration,
+    /// Independent samples before chains start.
+    pub bootstrap: Duration,
+    /// Rounds whose settings are not frozen yet.
+    pub adaptation: Duration,
+}
+
+/// What a run is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Independent samples before chains start.
+    Bootstrap,
+    /// Rounds whose settings are not frozen yet.
+    Adaptation,
+    /// Nothing is learnt any more.
+    Steady,
+}
+
+/// A moment at which a run is to be interrupted for a look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The first end of a sweep with so many mutations done: the same moment in every run of a job.
+    Mutations(u64),
+    /// The first end of a slice at or after that time.
+    Time(Duration),
 }
 
 impl Status {
@@ -125,6 +160,16 @@ pub trait Observer: Sync {
 
     /// A round is over; follows the [`progress`](Observer::progress) of the moment in which that was noticed.
     fn round(&self, _report: &RoundReport) {}
+
+    /// Where the run should come to its next [`progress`](Observer::progress) at the latest; no such wish by default.
+    fn next_stop(&self) -> Option<Stop> {
+        None
+    }
+
+    /// Whether the clock stands still while pictures are made and looked at, so that looking often makes no run slower.
+    fn stops_the_clock(&self) -> bool {
+        false
+    }
 
     /// Whether [`snapshot`](Observer::snapshot) should follow, for which a picture has to be made.
     fn wants_picture(&self, _status: &Status) -> bool {

@@ -36,15 +36,11 @@ fn bits(engine: &dyn Engine, stage: &Stage) -> Vec<u64> {
 /// Slices of lengths from `lengths`, over and over until all sweeps are done; a picture after each where `watched`.
 fn run(stage: &Stage, settings: &Settings, lengths: &[u64], watched: bool) -> Vec<u64> {
     let mut engine = engine(stage, settings, Some(MUTATIONS));
-    let wanted = engine.sweeps_left().expect("a limited run");
-    let mut done = 0;
     for length in lengths.iter().cycle() {
-        let sweeps = (*length).min(wanted - done);
-        if sweeps == 0 {
+        if engine.sweeps_left() == Some(0) {
             break;
         }
-        engine.advance(stage, sweeps);
-        done += sweeps;
+        engine.advance(stage, *length, None);
         if watched {
             engine.develop(stage);
         }
@@ -74,7 +70,7 @@ fn before_chains_move_replica_exchange_is_a_path_tracer() {
     let picture = |method| {
         let settings = Settings { method, ..Settings::default() };
         let mut engine = engine(&stage, &settings, Some(MUTATIONS));
-        engine.advance(&stage, 1);
+        engine.advance(&stage, 1, None);
         engine.develop(&stage).image
     };
     let image = picture(Method::ReplicaExchange);
@@ -97,7 +93,7 @@ fn the_normalisation_of_metropolis_varies_by_its_standard_error() {
             .map(|seed| {
                 let stage = Stage { rng: Rng::new(seed), ..stage(&scene) };
                 let mut engine = engine(&stage, &settings, Some(MUTATIONS));
-                engine.advance(&stage, engine.sweeps_left().expect("a limited run"));
+                engine.advance(&stage, engine.sweeps_left().expect("a limited run"), None);
                 engine.develop(&stage).normalisation.expect("every method has one")
             })
             .collect();

@@ -38,7 +38,7 @@ pub use normalisers::Normalisers;
 pub use placement::rungs;
 pub use probes::{ProbeMap, Probes};
 pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungReport, ScaleReport};
-pub use sampler::{Development, Learnt, Sampler, Setup};
+pub use sampler::{Development, Learning, Learnt, Sampler, Setup};
 pub use stepping::stepping_stones;
 pub use steps::StepMix;
 pub use tally::{Canvas, Layers, PointGroups, Round, RungCounts, Sum, Tally};

@@ -25,7 +25,7 @@ fn run(choices: &Choices, threads: usize, slices: &[u64]) -> (Vec<u32>, Vec<u64>
         let toy = two_peaks();
         let mut sampler = sampler::<Toy>(choices.clone(), 16, 1 << 15, 7);
         for slice in slices.iter().cycle() {
-            sampler.advance(&toy, *slice);
+            sampler.advance(&toy, *slice, None);
             if sampler.sweeps_left() == Some(0) {
                 break;
             }
@@ -52,12 +52,35 @@ fn threads_and_slices_do_not_change_a_bit() {
 }
 
 #[test]
+fn stops_come_at_the_same_evaluations_however_a_run_is_sliced() {
+    let toy = two_peaks();
+    for choices in [Choices::default(), replicas(3, Combine::Balance)] {
+        let stops = |slice: u64| {
+            let mut sampler = sampler::<Toy>(choices.clone(), 16, 1 << 15, 7);
+            let stops = [1, 700, 5_000, 11_111, 20_000].map(|until| {
+                while sampler.evaluations() < until {
+                    sampler.advance(&toy, slice, Some(until));
+                }
+                let development = sampler.develop();
+                bits(&development.image, &development.learnt.normalisers.ln_z, sampler.evaluations())
+            });
+            for ([until, next], stop) in [[1, 700], [700, 5_000], [5_000, 11_111]].into_iter().zip(&stops) {
+                assert!((until..next).contains(&stop.2), "{} for {until}", stop.2);
+            }
+            stops
+        };
+        let whole = stops(u64::MAX);
+        assert!(whole == stops(1) && whole == stops(17), "{choices:?}");
+    }
+}
+
+#[test]
 fn looking_at_the_picture_changes_nothing() {
     let toy = two_peaks();
     let [looked, not] = [true, false].map(|looks| {
         let mut sampler = sampler::<Toy>(replicas(3, Combine::Balance), 16, 1 << 14, 7);
         while sampler.sweeps_left() != Some(0) {
-            sampler.advance(&toy, 5);
+            sampler.advance(&toy, 5, None);
             if looks {
                 let [first, second] = [(); 2].map(|()| sampler.develop());
                 let [first, second] = [first, second].map(|d| bits(&d.image, &d.learnt.normalisers.ln_z, 0));

@@ -109,7 +109,9 @@ pub fn sampler<T: Target>(choices: Choices, columns: u32, evaluations: u64, seed
 /// A whole run.
 pub fn run<T: Target>(target: &T, choices: Choices, columns: u32, evaluations: u64, seed: u64) -> Run {
     let mut sampler = sampler::<T>(choices, columns, evaluations, seed);
-    sampler.advance(target, u64::MAX);
+    while sampler.sweeps_left() != Some(0) {
+        sampler.advance(target, u64::MAX, None);
+    }
     let development = sampler.develop();
     let grey = |values: Vec<f32>| values.into_iter().map(f64::from).collect();
     let layers = development.layers.into_iter().map(|(name, plane)| match plane {

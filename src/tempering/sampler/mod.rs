@@ -132,6 +132,17 @@ struct Schedule {
     learning: u64,
 }
 
+/// What a run of replica exchange still learns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Learning {
+    /// Where the light is: uniform points only.
+    Bootstrap,
+    /// Rungs, weights, shares, sizes of steps.
+    Rounds,
+    /// Nothing: settings are frozen.
+    Over,
+}
+
 /// What a run of replica exchange is about, beside what is sampled.
 pub struct Setup {
     /// Random numbers.
@@ -240,19 +251,40 @@ impl<W: Default + Send> Sampler<W> {
         ladders as u64 * self.schedule.ladder_sweeps + (self.portions.len() * self.schedule.points) as u64
     }
 
-    /// Goes through `sweeps` more sweeps, or what is left of the budget, in parallel over blocks. All state is a
-    /// function of the job and the evaluations done, never of the threads or of how sweeps were sliced.
-    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, mut sweeps: u64) {
-        while sweeps > 0 && self.sweeps_left() != Some(0) {
+    /// What is still being learnt.
+    pub fn learning(&self) -> Learning {
+        match self.schedule {
+            Schedule { frozen: true, .. } => Learning::Over,
+            Schedule { round: 0, .. } => Learning::Bootstrap,
+            _ => Learning::Rounds,
+        }
+    }
+
+    /// Goes through `sweeps` more sweeps, or what is left of the budget, in parallel over blocks; through fewer where
+    /// the first end of a sweep with `until` evaluations done, or a change of what is [learnt](Sampler::learning), comes
+    /// before. Returns how many they were. All state is a function of the job and the evaluations done, never of the threads or of how sweeps were
+    /// sliced.
+    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, until: Option<u64>) -> u64 {
+        let learning = self.learning();
+        let until = until.unwrap_or(u64::MAX);
+        let mut gone = 0;
+        while gone < sweeps && self.evaluations < until && self.sweeps_left() != Some(0) {
             if self.schedule.done == self.schedule.length {
                 self.end_round(target);
+                if self.learning() != learning {
+                    break;
+                }
             }
             let stop =
                 if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
-            let now = sweeps.min(stop - self.schedule.done).min(self.sweeps_left().unwrap_or(u64::MAX));
+            let now = (sweeps - gone)
+                .min(stop - self.schedule.done)
+                .min(self.sweeps_left().unwrap_or(u64::MAX))
+                .min((until - self.evaluations).div_ceil(self.a_sweep()));
             self.work(target, now);
-            sweeps -= now;
+            gone += now;
         }
+        gone
     }
 
     /// Sweeps within a round.
