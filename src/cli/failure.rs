@@ -3,6 +3,8 @@
 use std::fmt;
 use std::process::ExitCode;
 
+use super::signals;
+
 /// Messages and an exit code. Its text ends in a newline.
 #[derive(Debug)]
 pub(super) enum Failure {
@@ -12,6 +14,8 @@ pub(super) enum Failure {
     Shown(String),
     /// It failed on the way; code 1.
     Running(String),
+    /// A signal ended it before it was done; what is finished is kept, and these words say how to go on; code 130.
+    Stopped(String),
 }
 
 impl Failure {
@@ -25,6 +29,11 @@ impl Failure {
         Failure::Running(reason.to_string())
     }
 
+    /// Ended by a signal, with words on how to go on.
+    pub fn stopped(how_to_go_on: impl fmt::Display) -> Failure {
+        Failure::Stopped(how_to_go_on.to_string())
+    }
+
     /// A fault of an input file, shown in place; colours and frames only where standard error is a terminal.
     pub fn shown(report: impl miette::Diagnostic + Send + Sync + 'static) -> Failure {
         Failure::Shown(format!("{:?}\n", miette::Report::new(report)))
@@ -33,6 +42,7 @@ impl Failure {
     pub fn code(&self) -> ExitCode {
         match self {
             Failure::Running(_) => ExitCode::from(1),
+            Failure::Stopped(_) => ExitCode::from(signals::ENDED_AT_ONCE as u8),
             Failure::Input(_) | Failure::Shown(_) => ExitCode::from(2),
         }
     }
@@ -44,6 +54,7 @@ impl fmt::Display for Failure {
             Failure::Input(reasons) => reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}")),
             Failure::Shown(text) => f.write_str(text),
             Failure::Running(reason) => writeln!(f, "error: {reason}"),
+            Failure::Stopped(how) => writeln!(f, "stopped: {how}"),
         }
     }
 }

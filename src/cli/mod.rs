@@ -6,6 +6,7 @@ mod ladder;
 mod render;
 mod scene;
 mod signals;
+mod study;
 mod values;
 
 use std::io::{self, Write};
@@ -26,6 +27,7 @@ enum Command {
     Render(Box<render::Render>),
     Info(info::Info),
     Ladder(ladder::Ladder),
+    Study(study::StudyArguments),
 }
 
 const EXIT_CODES: &str = "\
@@ -33,7 +35,7 @@ Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
   2    nothing was begun: faulty options or scene, no Embree, unwritable files
-  130  ended at once by a second signal, without an image";
+  130  ended at once by a second signal, without an image; a study that was stopped, with what is finished kept";
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
@@ -49,6 +51,7 @@ pub fn main() -> ExitCode {
         Command::Render(arguments) => render::run(*arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
+        Command::Study(arguments) => study::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

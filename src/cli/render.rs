@@ -155,7 +155,7 @@ impl Render {
     }
 
     /// The run that is asked for, or everything that is wrong with it.
-    fn settings(&self) -> Result<Settings, Failure> {
+    pub(super) fn settings(&self) -> Result<Settings, Failure> {
         let no_budget = self.mpp.is_none() && self.time.is_none();
         let settings = Settings {
             method: self.method,

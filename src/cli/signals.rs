@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use super::failure::Failure;
 
 /// What shells expect of a program that Ctrl-C ended.
-const ENDED_AT_ONCE: i32 = 130;
+pub(super) const ENDED_AT_ONCE: i32 = 130;
 
 /// The flag that the first signal raises.
 pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {

@@ -1,0 +1,316 @@
+//! `relt study`: error against run time of many methods on many scenes, from a small file to a report.
+
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use clap::{Args, Parser};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::failure::Failure;
+use super::{render, signals};
+use crate::film::file::write_whole;
+use crate::render::{Observer, Settings, Status};
+use crate::study::collect::collect;
+use crate::study::file::{self, Budget, Study};
+use crate::study::forecast;
+use crate::study::jobs::{Prepared, StudyJob, jobs, prepare, quoted};
+use crate::study::report;
+use crate::study::runner::{Folder, RunError, Runner, this_program};
+
+/// Renders scenes by methods and seeds as a study file says, and reports error against run time
+#[derive(Args)]
+#[command(after_help = super::EXIT_CODES)]
+pub(super) struct StudyArguments {
+    /// Study file, TOML, such as those in scenes/studies
+    #[arg(value_name = "STUDY")]
+    file: PathBuf,
+
+    /// Folder for the report, tables, plots, runs and images; with a part of the study in it the rest is done
+    /// [default: the file's name without .toml, in the current folder]
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+
+    /// Lists the runs with the time they should take, and does none
+    #[arg(long)]
+    dry_run: bool,
+
+    /// Shows nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the subcommand.
+pub(super) fn run(arguments: StudyArguments) -> Result<(), Failure> {
+    let study = file::read(&arguments.file, &parse_options).map_err(|error| match error {
+        file::StudyError::Content(faults) => Failure::Input(faults),
+        file::StudyError::File(error) => Failure::input(error),
+    })?;
+    let prepared = prepare(&study).map_err(Failure::Input)?;
+    let jobs = jobs(&study, &prepared);
+    let output = arguments.output();
+    if arguments.dry_run {
+        return list(&study, &jobs, &output);
+    }
+    let folder = Folder::open(&output).map_err(Failure::input)?;
+    let stop = signals::stop_flag()?;
+    let runner = Runner { study: &study, prepared: &prepared, folder: &folder, program: this_program(), stop: &stop };
+    let ended = work(&runner, &jobs, &Display::new(arguments.quiet));
+    // what there is by now is worth a report, whatever came after
+    let summary = write_report(&study, &prepared, &jobs, &folder)?;
+    ended?;
+    if !arguments.quiet {
+        drop(writeln!(io::stdout(), "{summary}\n{}", folder.path().join(REPORT).display()));
+    }
+    Ok(())
+}
+
+/// The page.
+const REPORT: &str = "report.html";
+
+impl StudyArguments {
+    fn output(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| {
+            let name = self.file.file_stem().filter(|_| self.file.extension().is_some());
+            let name = name.map(|name| name.to_owned()).unwrap_or_else(|| "study".into());
+            PathBuf::from(name)
+        })
+    }
+}
+
+/// From options of a method to settings, by the command line of `relt render` itself.
+fn parse_options(words: &[String]) -> Result<Settings, String> {
+    #[derive(Parser)]
+    #[command(name = "relt render", no_binary_name = true)]
+    struct Line {
+        #[command(flatten)]
+        render: render::Render,
+    }
+    let line = ["scene.xml".to_owned()].into_iter().chain(words.iter().cloned());
+    // the message without the usage, which is about a command line
+    let first = |error: clap::Error| {
+        let text = error.render().to_string();
+        text.split("\n\nUsage:").next().unwrap_or_default().trim_start_matches("error: ").trim().to_owned()
+    };
+    let line = Line::try_parse_from(line).map_err(first)?;
+    line.render.settings().map_err(|failure| failure.to_string().replace("error: ", ""))
+}
+
+/// All runs that are not finished yet.
+fn work(runner: &Runner, jobs: &[StudyJob], display: &Display) -> Result<(), Failure> {
+    let left: Vec<&StudyJob> = jobs.iter().filter(|job| !runner.is_done(job)).collect();
+    let finished = jobs.len() - left.len();
+    if finished > 0 {
+        display.say(&format!("{finished} of {} runs are finished already", jobs.len()));
+    }
+    let mut pace = Pace::default();
+    for (i, job) in left.iter().enumerate() {
+        let what = name(runner.study, job);
+        let number = finished + i + 1;
+        let heading = format!("{number}/{} {what}", jobs.len());
+        let coming = pace.time_of(runner.study, &left[i + 1..]);
+        let begin = Instant::now();
+        let line = Line { display, heading: &heading, coming, stop: runner.stop };
+        match runner.run(job, &line) {
+            Ok(()) => {
+                pace.took(job, begin.elapsed());
+                display.done(&format!("{heading}: {:.1} s", begin.elapsed().as_secs_f64()));
+            }
+            Err(RunError::Stopped) => return Err(Failure::stopped("the same command goes on where this one stopped")),
+            Err(RunError::Failed(reason)) => return Err(Failure::running(format_args!("{what}: {reason}"))),
+        }
+    }
+    Ok(())
+}
+
+fn name(study: &Study, job: &StudyJob) -> String {
+    let (scene, method) = (&study.scenes[job.scene].name, &study.methods[job.method].name);
+    format!("{scene}, {method}, seed {}", job.seed)
+}
+
+/// How long runs take, from those that are done.
+#[derive(Default)]
+struct Pace {
+    done: Vec<(usize, usize, Duration)>,
+}
+
+impl Pace {
+    fn took(&mut self, job: &StudyJob, time: Duration) {
+        self.done.push((job.scene, job.method, time));
+    }
+
+    /// Time of some runs: as those of the same scene and method took, else of the same scene, else as all did; unknown
+    /// before any is done, unless time is what runs are given.
+    fn time_of(&self, study: &Study, jobs: &[&StudyJob]) -> Option<Duration> {
+        let mean = |like: &dyn Fn(&(usize, usize, Duration)) -> bool| {
+            let times: Vec<Duration> = self.done.iter().filter(|done| like(done)).map(|(_, _, time)| *time).collect();
+            (!times.is_empty()).then(|| times.iter().sum::<Duration>() / times.len() as u32)
+        };
+        let given = match study.budget {
+            Budget::Time(time) => Some(time),
+            Budget::Mutations(_) => None,
+        };
+        let time = |job: &&StudyJob| {
+            mean(&|(scene, method, _)| (*scene, *method) == (job.scene, job.method))
+                .or_else(|| mean(&|(scene, ..)| *scene == job.scene))
+                .or_else(|| mean(&|_| true))
+                .or(given)
+        };
+        jobs.iter().map(time).sum()
+    }
+}
+
+/// Writes the page and all that goes beside it; returns the summary.
+fn write_report(study: &Study, prepared: &[Prepared], jobs: &[StudyJob], folder: &Folder) -> Result<String, Failure> {
+    let command = std::env::args().skip(1).map(|word| quoted(&word)).fold("relt".to_owned(), |a, b| a + " " + &b);
+    let results = collect(study, prepared, jobs, folder, &command).map_err(Failure::running)?;
+    let path = folder.path();
+    report::write(&results, path).map_err(Failure::running)?;
+    let plots = path.join("plots");
+    std::fs::create_dir_all(&plots)
+        .map_err(|error| Failure::running(format_args!("cannot write {}: {error}", plots.display())))?;
+    let tables = [("results.csv".into(), report::csv(&results)), ("study.toml".into(), study.text.clone())];
+    let plots = report::plots(&results).into_iter().map(|(name, svg)| (Path::new("plots").join(name), svg));
+    for (name, text) in plots.chain(tables) {
+        write_whole(&path.join(name), |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))
+            .map_err(Failure::running)?;
+    }
+    Ok(report::text(&results))
+}
+
+/// The runs and the time they should take.
+fn list(study: &Study, jobs: &[StudyJob], folder: &Path) -> Result<(), Failure> {
+    let is_done = |job: &StudyJob| job.record(folder).is_file();
+    let left: Vec<&StudyJob> = jobs.iter().filter(|job| !is_done(job)).collect();
+    let times = forecast::times(study, &left).map_err(Failure::running)?;
+    let mut text = String::new();
+    let mut forecasts = times.iter();
+    for (number, job) in (1..).zip(jobs) {
+        let time = match is_done(job) {
+            true => "finished".to_owned(),
+            false => in_words(*forecasts.next().expect("one for each run that is left")),
+        };
+        text += &format!("{number:4}  {time:>9}  {}\n      {}\n", name(study, job), job.command(study));
+    }
+    let all: Duration = times.iter().sum();
+    text += &format!(
+        "{} runs, {} of them finished; the others take about {}\n",
+        jobs.len(),
+        jobs.len() - left.len(),
+        in_words(all)
+    );
+    drop(write!(io::stdout(), "{text}")); // whoever reads may have read enough
+    Ok(())
+}
+
+/// A time to two places, as people say it.
+fn in_words(time: Duration) -> String {
+    match time.as_secs_f64() {
+        seconds @ ..100.0 => format!("{seconds:.0} s"),
+        seconds @ ..6000.0 => format!("{:.0} min", seconds / 60.0),
+        seconds => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+/// What the person sees.
+enum Display {
+    Quiet,
+    /// A line that is drawn again and again.
+    Terminal(ProgressBar),
+    /// A line for each finished run.
+    Plain,
+}
+
+impl Display {
+    fn new(quiet: bool) -> Display {
+        match (quiet, io::stderr().is_terminal()) {
+            (true, _) => Display::Quiet,
+            (_, false) => Display::Plain,
+            _ => {
+                let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
+                bar.set_style(ProgressStyle::with_template("{bar:24} {msg}").expect("a template known to be right"));
+                Display::Terminal(bar)
+            }
+        }
+    }
+
+    /// Words that stay.
+    fn say(&self, words: &str) {
+        match self {
+            Display::Quiet => {}
+            Display::Terminal(bar) => bar.suspend(|| drop(writeln!(io::stderr(), "{words}"))),
+            Display::Plain => drop(writeln!(io::stderr(), "{words}")),
+        }
+    }
+
+    /// A run is over.
+    fn done(&self, words: &str) {
+        match self {
+            Display::Terminal(bar) => bar.set_position(0),
+            display => display.say(words),
+        }
+    }
+}
+
+/// Shows the run at work.
+struct Line<'a> {
+    display: &'a Display,
+    heading: &'a str,
+    /// Time of the runs that come after it.
+    coming: Option<Duration>,
+    stop: &'a AtomicBool,
+}
+
+impl Observer for Line<'_> {
+    fn progress(&self, status: &Status) {
+        let Display::Terminal(bar) = self.display else { return };
+        bar.set_position((1000.0 * status.fraction()) as u64);
+        let left = self
+            .coming
+            .zip(status.time_left())
+            .map(|(coming, now)| format!("\n{} left in all", in_words(coming + now)));
+        let stopping = if self.stop.load(Relaxed) { ", stopping" } else { "" };
+        bar.set_message(format!("{}{stopping}{}", self.heading, left.unwrap_or_default()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Method;
+
+    #[test]
+    fn methods_of_a_study_speak_the_language_of_render() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let settings = parse_options(&words("--method mlt --large-steps 0.5 --kelemen-weights")).unwrap();
+        assert_eq!((settings.method, settings.mlt.large_steps, settings.mlt.kelemen_weights), (Method::Mlt, 0.5, true));
+        let message = parse_options(&words("--method mtl")).unwrap_err();
+        assert!(message.starts_with("invalid value 'mtl' for '--method") && !message.contains("Usage"), "{message}");
+        let message = parse_options(&words("--method path --replicas 2")).unwrap_err();
+        assert!(message.starts_with("--replicas: --method path has no ladder"), "{message}");
+    }
+
+    #[test]
+    fn times_left_are_those_of_runs_alike() {
+        let job = |scene, method| StudyJob { scene, method, seed: 1, id: String::new() };
+        let [a, b, c] = [job(0, 0), job(0, 1), job(1, 0)];
+        let text = "title = \"t\"\nmpp = 1\n[[scene]]\nfile = \"a/b.xml\"\n[[method]]\nmethod = \"re\"\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, text).unwrap();
+        let study = file::read(&path, &parse_options).unwrap();
+        let mut pace = Pace::default();
+        assert_eq!(pace.time_of(&study, &[&a]), None);
+        pace.took(&a, Duration::from_secs(4));
+        pace.took(&a, Duration::from_secs(6));
+        pace.took(&c, Duration::from_secs(20));
+        assert_eq!(pace.time_of(&study, &[&a, &b, &c]), Some(Duration::from_secs(30)));
+    }
+
+    #[test]
+    fn times_read_well() {
+        let words = [3.2, 99.0, 150.0, 7200.0].map(|seconds| in_words(Duration::from_secs_f64(seconds)));
+        assert_eq!(words, ["3 s", "99 s", "2 min", "2.0 h"]);
+    }
+}

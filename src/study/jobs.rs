@@ -1,0 +1,188 @@
+//! The runs of a study: which there are, in which order, and under which names they are kept.
+
+use std::fmt::{self, Write};
+use std::path::{Path, PathBuf};
+
+use super::file::{Budget, Study};
+use super::metrics::Reference;
+use crate::load;
+use crate::render::Settings;
+use crate::scene::SceneDescription;
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StudyJob {
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the method.
+    pub method: usize,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Name of its files: scene, method and seed in letters that any file system takes, and a checksum of all that the
+    /// result depends on, so that whatever is changed is done again and nothing else.
+    pub id: String,
+}
+
+/// What is known of a scene of the study before anything is rendered.
+pub struct Prepared {
+    /// Pixels a row and rows.
+    pub size: [u32; 2],
+    /// The truth, at that size.
+    pub reference: Reference,
+    /// Checksum of scene and reference.
+    checksum: u32,
+}
+
+impl Prepared {
+    /// Of a scene as it was read, and its reference.
+    pub fn new(description: &SceneDescription, reference: Reference) -> Prepared {
+        let mut checksum = Checksum::default();
+        write!(checksum, "{description:?}").expect("checksums take all");
+        for image in [Some(&reference.image), reference.variance.as_ref()].into_iter().flatten() {
+            image.pixels.as_flattened().iter().for_each(|value| checksum.0.update(&value.to_le_bytes()));
+        }
+        let size = [description.film.width, description.film.height];
+        Prepared { size, reference, checksum: checksum.0.finalize() }
+    }
+}
+
+/// CRC-32 of a text as it is written.
+#[derive(Default)]
+struct Checksum(crc32fast::Hasher);
+
+impl Write for Checksum {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.update(text.as_bytes());
+        Ok(())
+    }
+}
+
+/// Reads scenes and references; every reason why one cannot be used, a line each.
+pub fn prepare(study: &Study) -> Result<Vec<Prepared>, Vec<String>> {
+    let mut faults = Vec::new();
+    let mut prepared = Vec::new();
+    for scene in &study.scenes {
+        match prepare_scene(&scene.file, &scene.defines, &scene.reference) {
+            Ok(scene) => prepared.push(scene),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    if faults.is_empty() { Ok(prepared) } else { Err(faults) }
+}
+
+fn prepare_scene(file: &Path, defines: &[(String, String)], reference: &Path) -> Result<Prepared, String> {
+    let description = load::scene(file, defines).map_err(|error| format!("{:?}", miette::Report::new(error)))?;
+    let found = Reference::read(reference).map_err(|faults| faults.join("\n"))?;
+    let (film, size) = (&description.film, [found.image.width, found.image.height]);
+    let fitting = match size == [film.width, film.height] {
+        true => Some(found),
+        // means over the same parts of the film, which with a box filter is what a smaller picture has
+        false if film.filter == crate::film::Filter::Box => found.shrunk_to(film.width, film.height),
+        false => None,
+    };
+    let fitting = fitting.ok_or_else(|| {
+        format!(
+            "{} has {} × {} pixels, {} has {} × {}; accepted are references of the same size and, with the box filter, \
+             of a multiple of it",
+            reference.display(),
+            size[0],
+            size[1],
+            file.display(),
+            film.width,
+            film.height
+        )
+    })?;
+    Ok(Prepared::new(&description, fitting))
+}
+
+/// All runs, in the order in which they are done: seed by seed, within a seed scene by scene, and within a scene method
+/// by method, beginning with another one for each seed. So whatever drifts while a study is at work (other load, heat)
+/// meets all methods alike, and a study that is stopped early has a few seeds of everything.
+pub fn jobs(study: &Study, prepared: &[Prepared]) -> Vec<StudyJob> {
+    let methods = study.methods.len();
+    let mut jobs = Vec::new();
+    for (turn, &seed) in study.seeds.iter().enumerate() {
+        for scene in 0..study.scenes.len() {
+            for method in (0..methods).map(|i| (i + turn) % methods) {
+                jobs.push(StudyJob { scene, method, seed, id: id(study, &prepared[scene], scene, method, seed) });
+            }
+        }
+    }
+    jobs
+}
+
+fn id(study: &Study, prepared: &Prepared, scene: usize, method: usize, seed: u64) -> String {
+    let (names, options) = (&study.scenes[scene], &study.methods[method]);
+    let mut checksum = Checksum::default();
+    let program = env!("CARGO_PKG_VERSION");
+    let parts =
+        (prepared.checksum, &options.options, seed, study.budget, study.snapshot_times(), keeps_images(study, seed));
+    write!(checksum, "{parts:?} {program}").expect("checksums take all");
+    format!("{}-{}-{seed}-{:08x}", file_name(&names.name), file_name(&options.name), checksum.0.finalize())
+}
+
+/// Letters, digits and single dashes.
+fn file_name(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("-").to_lowercase()
+}
+
+/// Whether a run's images are kept at every snapshot, not only at its end: those of the first seed, for the viewer.
+pub fn keeps_images(study: &Study, seed: u64) -> bool {
+    study.seeds.first() == Some(&seed)
+}
+
+impl StudyJob {
+    /// What is known of a run that is finished.
+    pub fn record(&self, folder: &Path) -> PathBuf {
+        folder.join("runs").join(format!("{}.jsonl", self.id))
+    }
+
+    /// The same while it is at work.
+    pub fn unfinished_record(&self, folder: &Path) -> PathBuf {
+        folder.join("runs").join(format!("{}.jsonl.part", self.id))
+    }
+
+    /// An image of the run, with the number of the snapshot or of the end; relative to the study's folder.
+    pub fn image(&self, snapshot: Option<usize>) -> PathBuf {
+        let number = snapshot.map(|number| format!("-at-{number:03}")).unwrap_or_default();
+        Path::new("images").join(format!("{}{number}.exr", self.id))
+    }
+
+    /// Settings of the run but for a budget in time.
+    pub fn settings(&self, study: &Study) -> Settings {
+        let mutations_per_pixel = match study.budget {
+            Budget::Mutations(mpp) => Some(mpp),
+            Budget::Time(_) => None,
+        };
+        Settings { seed: self.seed, mutations_per_pixel, time: None, ..study.methods[self.method].settings.clone() }
+    }
+
+    /// A command line that repeats the run.
+    pub fn command(&self, study: &Study) -> String {
+        let budget = match study.budget {
+            Budget::Mutations(mpp) => format!("--mpp {mpp}"),
+            Budget::Time(time) => format!("--time {}ms", time.as_millis()),
+        };
+        let options: Vec<String> = study.methods[self.method].options.iter().map(|word| quoted(word)).collect();
+        let scene = scene_words(study, self.scene);
+        format!("relt render {scene} {} --seed {} {budget}", options.join(" "), self.seed)
+    }
+}
+
+/// A scene's file and definitions as they stand on a command line.
+pub fn scene_words(study: &Study, scene: usize) -> String {
+    let scene = &study.scenes[scene];
+    let defines = scene.defines.iter().map(|(name, value)| format!(" -D {}", quoted(&format!("{name}={value}"))));
+    quoted(&scene.file.display().to_string()) + &defines.collect::<String>()
+}
+
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
