@@ -88,10 +88,11 @@ fn parse_options(words: &[String]) -> Result<Settings, String> {
         render: render::Render,
     }
     let line = ["scene.xml".to_owned()].into_iter().chain(words.iter().cloned());
-    // the message without the usage, which is about a command line
+    // the message without hints about the command line, of which there is none
     let first = |error: clap::Error| {
         let text = error.render().to_string();
-        text.split("\n\nUsage:").next().unwrap_or_default().trim_start_matches("error: ").trim().to_owned()
+        let end = ["\n\nUsage:", "\n\nFor more information"].iter().filter_map(|hint| text.find(hint)).min();
+        text[..end.unwrap_or(text.len())].trim_start_matches("error: ").trim().to_owned()
     };
     let line = Line::try_parse_from(line).map_err(first)?;
     line.render.settings().map_err(|failure| failure.to_string().replace("error: ", ""))

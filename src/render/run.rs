@@ -321,6 +321,58 @@ mod tests {
         }
     }
 
+    /// Takes a picture at a given number of mutations, slowly.
+    struct Slow {
+        at: u64,
+        stops_the_clock: bool,
+        seen: Mutex<Vec<u64>>,
+    }
+
+    impl Slow {
+        const LOOK: Duration = Duration::from_millis(300);
+    }
+
+    impl Observer for Slow {
+        fn next_stop(&self) -> Option<Stop> {
+            Some(Stop::Mutations(self.at))
+        }
+
+        fn stops_the_clock(&self) -> bool {
+            self.stops_the_clock
+        }
+
+        fn wants_picture(&self, status: &Status) -> bool {
+            status.mutations >= self.at && self.seen.lock().unwrap().is_empty()
+        }
+
+        fn snapshot(&self, status: &Status, _: &Picture) {
+            self.seen.lock().unwrap().push(status.mutations);
+            std::thread::sleep(Slow::LOOK);
+        }
+    }
+
+    #[test]
+    fn looks_come_at_the_mutations_asked_for_and_take_time_only_where_the_clock_goes_on() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.xml");
+        let description = crate::load::scene(&path, &[("res".into(), "16".into())]).unwrap();
+        let scene = Scene::new(&Device::new("").unwrap(), description).unwrap();
+        let look = |stops_the_clock: bool| {
+            let packet = PacketChoice::Fixed(Width::W8);
+            let settings = Settings { packet, mutations_per_pixel: Some(32.0), ..Settings::default() };
+            let job = Job { scene: &scene, scene_name: String::new(), settings, stop: &AtomicBool::new(false) };
+            let slow = Slow { at: 3000, stops_the_clock, seen: Mutex::default() };
+            let status = run(&job, &slow).unwrap().status;
+            let SetUp { bootstrap, adaptation, .. } = status.set_up;
+            assert!(!bootstrap.is_zero() && !adaptation.is_zero(), "{:?}", status.set_up);
+            assert!(bootstrap + adaptation <= status.elapsed);
+            (slow.seen.into_inner().unwrap(), status.elapsed)
+        };
+        let ((with, short), (without, long)) = (look(true), look(false));
+        assert_eq!(with, without, "the same moment of the same run");
+        assert!((3000..3600).contains(&with[0]), "{with:?}");
+        assert!(long >= Slow::LOOK && short + Slow::LOOK / 2 < long, "{short:?} and {long:?}");
+    }
+
     #[test]
     fn rounds_reach_the_observer_in_order_and_the_last_one_the_image() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box/scene.xml");

@@ -244,6 +244,7 @@ impl Observer for Watch<'_> {
     }
 
     fn progress(&self, status: &Status) {
+        self.log.progress(status);
         self.observer.progress(status);
     }
 
