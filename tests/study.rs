@@ -236,16 +236,15 @@ fn a_dry_run_lists_commands_and_times_and_leaves_nothing() {
 #[test]
 fn equal_time_means_equal_time_with_the_clock_stopped_for_looking() {
     let folder = tempfile::tempdir().unwrap();
-    let text =
-        study("clock = \"wall\"").replace("mpp = 24", "time = \"700ms\"").replace("snapshots = 3", "snapshots = 9");
+    let text = study("").replace("mpp = 24", "time = \"1500ms\"").replace("snapshots = 3", "snapshots = 9");
     write_study(folder.path(), &text.replace("seeds = 2", "seeds = [5]"));
     done(relt(folder.path(), &["small.toml", "-q"]).output().unwrap());
     for (name, lines) in records(&folder.path().join("small")) {
         let seconds: Vec<f64> = events(&lines, "errors").iter().map(|m| m["wall_seconds"].as_f64().unwrap()).collect();
-        let end = *seconds.last().unwrap();
+        assert!(seconds.windows(2).all(|pair| pair[0] < pair[1]), "{name}: {seconds:?}");
         // a slice may be under way when time is up; on a machine that others use as well it may take a while
-        assert!((0.7..1.5).contains(&end), "{name}: {seconds:?}");
-        assert!(seconds.len() >= 4, "{name}: {seconds:?}");
+        assert!(seconds.last().is_some_and(|end| (1.5..4.0).contains(end)), "{name}: {seconds:?}");
+        assert!(seconds.len() >= 2, "{name}: {seconds:?}");
     }
 }
 
@@ -265,8 +264,8 @@ fn what_cannot_be_studied_is_told_before_anything_is_rendered() {
     refused(
         &study("").replace("\"mlt\"", "\"mtl\"").replace("[1, 3]", "\"some\""),
         &[
-            "small.toml:8:1: method `mtl`: invalid value 'mtl' for '--method",
-            "small.toml:10:1: method `re`: invalid value 'some'",
+            "small.toml:9:1: method `mtl`: invalid value 'mtl' for '--method",
+            "small.toml:11:1: method `re`: invalid value 'some'",
         ],
     );
     refused(&study("").replace("scene.xml", "scen.xml"), &["scen.xml", "cannot be read"]);
