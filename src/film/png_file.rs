@@ -1,6 +1,6 @@
 //! PNG previews: 8 bits, sRGB, exposure 1.
 
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::file::{FileError, write_whole};
@@ -8,16 +8,37 @@ use super::image::Image;
 
 /// Writes the image as it looks on a screen: linear 1 is full brightness, what is brighter is clipped.
 pub fn write(path: &Path, image: &Image) -> Result<(), FileError> {
-    let bytes: Vec<u8> = image.pixels.as_flattened().iter().map(|&value| srgb_byte(value)).collect();
-    write_whole(path, |file| {
-        let mut encoder = png::Encoder::new(BufWriter::new(file), image.width, image.height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-        let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-        writer.write_image_data(&bytes).map_err(|error| error.to_string())?;
-        writer.finish().map_err(|error| error.to_string())
-    })
+    let bytes = screen_bytes(image);
+    write_whole(path, |file| encode_to(file, [image.width, image.height], &bytes))
+}
+
+/// The same file in memory.
+pub fn encode(image: &Image) -> Vec<u8> {
+    encode_bytes([image.width, image.height], &screen_bytes(image))
+}
+
+/// A file in memory of sRGB bytes, three a pixel, top row first.
+///
+/// # Panics
+/// If their number is not three times width times height, or one of these is 0.
+pub fn encode_bytes([width, height]: [u32; 2], bytes: &[u8]) -> Vec<u8> {
+    let mut file = Vec::new();
+    encode_to(&mut file, [width, height], bytes).expect("memory takes what is written");
+    file
+}
+
+fn screen_bytes(image: &Image) -> Vec<u8> {
+    image.pixels.as_flattened().iter().map(|&value| srgb_byte(value)).collect()
+}
+
+fn encode_to(file: impl Write, [width, height]: [u32; 2], bytes: &[u8]) -> Result<(), String> {
+    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
+    writer.write_image_data(bytes).map_err(|error| error.to_string())?;
+    writer.finish().map_err(|error| error.to_string())
 }
 
 /// The byte of a linear value, IEC 61966-2-1: 12.92 v up to 0.0031308, 1.055 v^(1/2.4) − 0.055 above.
@@ -30,6 +51,15 @@ pub fn srgb_byte(linear: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_in_memory_is_the_file() {
+        let image = Image::new(2, 1, vec![[0.0, 0.18, 0.5], [1.0, 7.0, -1.0]]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image.png");
+        write(&path, &image).unwrap();
+        assert_eq!(encode(&image), std::fs::read(path).unwrap());
+    }
 
     #[test]
     fn spot_values_of_the_srgb_transfer() {

@@ -60,7 +60,7 @@ fn numbered(values: impl IntoIterator<Item = f64>) -> Vec<Mark> {
 }
 
 fn series(name: &str, colour: &'static str, marks: Marks, data: Vec<Mark>) -> Series {
-    Series { name: name.into(), colour, marks, data }
+    Series { name: name.into(), style: colour.into(), marks, data }
 }
 
 fn highest(values: impl Iterator<Item = f64>) -> f64 {

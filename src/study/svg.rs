@@ -7,6 +7,71 @@
 pub const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 /// For what is in the background.
 pub const GRAY: &str = "#888888";
+/// For what others are compared with.
+pub const DARK: &str = "#333333";
+
+/// How a series looks; black-and-white prints and any kind of colour vision tell more than six by shapes and dashes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Style {
+    /// As SVG has it.
+    pub colour: &'static str,
+    /// Pattern of lines as SVG has it; solid where empty.
+    pub dash: &'static str,
+    /// Of dots, and on lines at their points.
+    pub shape: Option<Shape>,
+}
+
+/// What stands for a datum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    /// Number of corners and where the first one is: up or half a step beside.
+    outline: Outline,
+    /// Whether its inside is white.
+    hollow: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Outline {
+    Circle,
+    Square,
+    Up,
+    Diamond,
+    Down,
+    Pentagon,
+}
+
+impl Style {
+    /// The n-th of many, from 0: six colours with a shape each, then again with dashes and hollow shapes.
+    pub fn numbered(n: usize) -> Style {
+        const OUTLINES: [Outline; 6] =
+            [Outline::Circle, Outline::Square, Outline::Up, Outline::Diamond, Outline::Down, Outline::Pentagon];
+        const DASHES: [&str; 4] = ["", "7 3", "2 2.5", "9 3 2 3"];
+        let (i, turn) = (n % COLOURS.len(), n / COLOURS.len());
+        let shape = Shape { outline: OUTLINES[i], hollow: turn % 2 == 1 };
+        Style { colour: COLOURS[i], dash: DASHES[turn % DASHES.len()], shape: Some(shape) }
+    }
+
+    /// What others are compared with.
+    pub fn of_baseline() -> Style {
+        Style { colour: DARK, dash: "", shape: Some(Shape { outline: Outline::Circle, hollow: true }) }
+    }
+
+    /// A line in the background.
+    pub fn guide() -> Style {
+        Style { colour: GRAY, dash: "4 4", shape: None }
+    }
+
+    /// Lines without points.
+    pub fn without_shape(self) -> Style {
+        Style { shape: None, ..self }
+    }
+}
+
+impl From<&'static str> for Style {
+    fn from(colour: &'static str) -> Style {
+        Style { colour, dash: "", shape: None }
+    }
+}
 
 /// A page of text and panels.
 pub struct Page {
@@ -69,12 +134,24 @@ impl Page {
         );
     }
 
-    fn line(&mut self, points: &[[f64; 2]], colour: &str, width: f64) {
-        let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+    fn line(&mut self, points: &[[f64; 2]], colour: &'static str, width: f64) {
+        self.styled_line(points, colour.into(), width);
+    }
+
+    fn styled_line(&mut self, points: &[[f64; 2]], style: Style, width: f64) {
+        let dash = match style.dash {
+            "" => String::new(),
+            dash => format!(" stroke-dasharray=\"{dash}\""),
+        };
         self.body += &format!(
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>\n",
-            points.join(" ")
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\"{dash}/>\n",
+            joined(points),
+            style.colour
         );
+    }
+
+    fn polygon(&mut self, corners: &[[f64; 2]], more: &str) {
+        self.body += &format!("<polygon points=\"{}\"{more}/>\n", joined(corners));
     }
 
     fn dot(&mut self, [x, y]: [f64; 2], radius: f64, colour: &str) {
@@ -82,6 +159,27 @@ impl Page {
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"{colour}\" fill-opacity=\"0.7\" \
              stroke=\"{colour}\"/>\n"
         );
+    }
+
+    /// A shape, or a plain dot where the style has none.
+    fn mark(&mut self, [x, y]: [f64; 2], style: Style) {
+        let Some(Shape { outline, hollow }) = style.shape else { return self.dot([x, y], 3.5, style.colour) };
+        let fill = if hollow { "#fff" } else { style.colour };
+        let more = format!(" fill=\"{fill}\" stroke=\"{}\" stroke-width=\"1.4\"", style.colour);
+        let (corners, turn, radius) = match outline {
+            Outline::Circle => {
+                self.body += &format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"{more}/>\n");
+                return;
+            }
+            Outline::Square => (4, 0.5, 3.8),
+            Outline::Up => (3, 0.0, 4.0),
+            Outline::Diamond => (4, 0.0, 4.0),
+            Outline::Down => (3, 0.5, 4.0),
+            Outline::Pentagon => (5, 0.0, 3.8),
+        };
+        let angle = |i: i32| (f64::from(i) + turn) * std::f64::consts::TAU / f64::from(corners);
+        let corner = |i| [x + radius * f64::sin(angle(i)), y - radius * f64::cos(angle(i))];
+        self.polygon(&(0..corners).map(corner).collect::<Vec<_>>(), &more);
     }
 
     fn rectangle(&mut self, area: Area, colour: &str) {
@@ -93,35 +191,49 @@ impl Page {
 
     /// Draws a panel; marks that are not finite are left out, and a panel without any says so.
     pub fn panel(&mut self, area: Area, panel: &Panel) {
-        let plot = Area { x: area.x + 62.0, y: area.y + 48.0, width: area.width - 74.0, height: area.height - 92.0 };
+        let names = panel.y.ticks.iter().map(|(_, name)| name.chars().count()).max().unwrap_or(0) as f64;
+        let left = (28.0 + PIXELS_PER_LETTER * names).max(62.0);
+        let legend = legend_places(panel, area.width - left - 12.0);
+        let below_first_row = legend.iter().map(|[_, y]| *y).fold(0.0, f64::max);
+        let top = 48.0 + below_first_row;
+        let plot = Area {
+            x: area.x + left,
+            y: area.y + top,
+            width: area.width - left - 12.0,
+            height: area.height - top - 44.0,
+        };
         self.text([area.x + 4.0, area.y + 16.0], 14.0, Anchor::Start, " font-weight=\"bold\"", &panel.title);
-        self.legend(plot.x, area.y + 36.0, panel);
-        self.axes(plot, panel);
+        self.legend([plot.x, area.y + 36.0], &legend, panel);
+        self.axes(plot, area.x + 14.0, panel);
         let drawn = panel.series.iter().enumerate().map(|(i, _)| self.series(plot, panel, i)).sum::<usize>();
         if drawn == 0 {
             let middle = [plot.x + 0.5 * plot.width, plot.y + 0.5 * plot.height];
-            self.text(middle, 12.0, Anchor::Middle, &format!(" fill=\"{GRAY}\""), "not measured in this round");
+            self.text(middle, 12.0, Anchor::Middle, &format!(" fill=\"{GRAY}\""), "not measured");
         }
     }
 
-    fn legend(&mut self, mut x: f64, y: f64, panel: &Panel) {
-        const PIXELS_PER_LETTER: f64 = 6.2; // of sans-serif fonts at size 11
-        for series in panel.series.iter().filter(|series| !series.name.is_empty()) {
-            let middle = [x + 7.0, y - 4.0];
+    fn legend(&mut self, [left, top]: [f64; 2], places: &[[f64; 2]], panel: &Panel) {
+        for (series, [x, y]) in panel.series.iter().filter(|series| !series.name.is_empty()).zip(places) {
+            let (x, y) = (left + x, top + y);
+            let middle = [x + 9.0, y - 4.0];
             match series.marks {
-                Marks::Lines | Marks::Steps => self.line(&[[x, middle[1]], [x + 14.0, middle[1]]], series.colour, 2.0),
-                Marks::Bars { .. } => {
-                    self.rectangle(Area { x: x + 2.0, y: y - 9.0, width: 10.0, height: 10.0 }, series.colour);
+                Marks::Lines | Marks::Steps | Marks::Segments => {
+                    self.styled_line(&[[x, middle[1]], [x + 18.0, middle[1]]], series.style, 2.0);
+                    if series.style.shape.is_some() {
+                        self.mark(middle, series.style);
+                    }
                 }
-                Marks::Dots | Marks::Errors | Marks::Bubbles => self.dot(middle, 4.0, series.colour),
+                Marks::Bars { .. } | Marks::Band => {
+                    self.rectangle(Area { x: x + 2.0, y: y - 9.0, width: 12.0, height: 10.0 }, series.style.colour);
+                }
+                Marks::Dots | Marks::Errors | Marks::Bubbles => self.mark(middle, series.style),
             }
-            self.words(x + 19.0, y, 11.0, &series.name);
-            x += 36.0 + PIXELS_PER_LETTER * series.name.chars().count() as f64;
+            self.words(x + 23.0, y, 11.0, &series.name);
         }
     }
 
     /// Frame, ticks with thin lines across, labels.
-    fn axes(&mut self, plot: Area, panel: &Panel) {
+    fn axes(&mut self, plot: Area, label: f64, panel: &Panel) {
         let (right, bottom) = (plot.x + plot.width, plot.y + plot.height);
         for (at, name) in &panel.x.ticks {
             let x = plot.x + plot.width * panel.x.place(*at);
@@ -136,7 +248,7 @@ impl Page {
         let corners = [[plot.x, plot.y], [right, plot.y], [right, bottom], [plot.x, bottom], [plot.x, plot.y]];
         self.line(&corners, GRAY, 1.0);
         self.text([plot.x + 0.5 * plot.width, bottom + 33.0], 12.0, Anchor::Middle, "", &panel.x.label);
-        let [x, y] = [plot.x - 48.0, plot.y + 0.5 * plot.height];
+        let [x, y] = [label, plot.y + 0.5 * plot.height];
         let turned = format!(" transform=\"rotate(-90 {x:.1} {y:.1})\"");
         self.text([x, y], 12.0, Anchor::Middle, &turned, &panel.y.label);
     }
@@ -149,37 +261,67 @@ impl Page {
         let y = |value: f64| bottom - plot.height * panel.y.place(value);
         let marks: Vec<Mark> = series.data.iter().filter(|mark| panel.holds(mark)).copied().collect();
         let points: Vec<[f64; 2]> = marks.iter().map(|mark| [x(mark.x), y(mark.y)]).collect();
+        let style = series.style;
         match series.marks {
-            Marks::Lines => self.line(&points, series.colour, 1.8),
-            Marks::Steps => self.line(&steps(&points), series.colour, 1.3),
-            Marks::Dots => points.iter().for_each(|at| self.dot(*at, 3.5, series.colour)),
+            Marks::Lines => {
+                self.styled_line(&points, style, 1.8);
+                if style.shape.is_some() {
+                    points.iter().for_each(|at| self.mark(*at, style));
+                }
+            }
+            Marks::Steps => self.styled_line(&steps(&points), style, 1.3),
+            Marks::Segments => points.chunks_exact(2).for_each(|ends| self.styled_line(ends, style, 1.5)),
+            Marks::Band => self.polygon(&points, &format!(" fill=\"{}\" fill-opacity=\"0.14\"", style.colour)),
+            Marks::Dots => points.iter().for_each(|at| self.mark(*at, style)),
             Marks::Bubbles => {
                 for (mark, at) in marks.iter().zip(&points).filter(|(mark, _)| mark.size > 0.0) {
-                    self.dot(*at, 12.0 * mark.size.min(1.0).sqrt(), series.colour);
+                    self.dot(*at, 12.0 * mark.size.min(1.0).sqrt(), style.colour);
                 }
             }
             Marks::Errors => {
                 for (mark, at) in marks.iter().zip(&points) {
                     if mark.size.is_finite() {
-                        self.line(
-                            &[[at[0], y(mark.y - mark.size)], [at[0], y(mark.y + mark.size)]],
-                            series.colour,
-                            1.5,
-                        );
+                        self.line(&[[at[0], y(mark.y - mark.size)], [at[0], y(mark.y + mark.size)]], style.colour, 1.5);
                     }
-                    self.dot(*at, 3.0, series.colour);
+                    self.dot(*at, 3.0, style.colour);
                 }
             }
             Marks::Bars { beside, of } => {
                 let width = 0.8 * (x(1.0) - x(0.0)) / of as f64;
                 for at in points.iter() {
                     let left = at[0] + width * (beside as f64 - 0.5 * of as f64);
-                    self.rectangle(Area { x: left, y: at[1], width, height: bottom - at[1] }, series.colour);
+                    self.rectangle(Area { x: left, y: at[1], width, height: bottom - at[1] }, style.colour);
                 }
             }
         }
         marks.len()
     }
+}
+
+/// Generous width of a letter of sans-serif fonts at size 11.
+const PIXELS_PER_LETTER: f64 = 6.2;
+
+/// Where the names of series stand from the upper left: side by side, and in further rows where a row is full.
+fn legend_places(panel: &Panel, width: f64) -> Vec<[f64; 2]> {
+    const ROW: f64 = 16.0;
+    let (mut x, mut y) = (0.0, 0.0);
+    let named = panel.series.iter().filter(|series| !series.name.is_empty());
+    named
+        .map(|series| {
+            let needed = 29.0 + PIXELS_PER_LETTER * series.name.chars().count() as f64;
+            if x > 0.0 && x + needed > width {
+                (x, y) = (0.0, y + ROW);
+            }
+            let place = [x, y];
+            x += needed + 11.0;
+            place
+        })
+        .collect()
+}
+
+/// Points as SVG has them.
+fn joined(points: &[[f64; 2]]) -> String {
+    points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
 }
 
 /// The corners of a line that keeps each value until the next.
@@ -188,8 +330,8 @@ fn steps(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     corners.chain(points.last().copied()).collect()
 }
 
-fn escaped(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+pub(super) fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
     text.replace(char::is_control, " ") // which XML does not allow at all
 }
 
@@ -215,8 +357,8 @@ impl Panel {
 pub struct Series {
     /// In the legend; none where empty.
     pub name: String,
-    /// As SVG has it.
-    pub colour: &'static str,
+    /// How it looks.
+    pub style: Style,
     /// How each datum is drawn.
     pub marks: Marks,
     /// The data.
@@ -230,7 +372,11 @@ pub enum Marks {
     Lines,
     /// A line that keeps each value until the next.
     Steps,
-    /// Filled dots.
+    /// A line from each datum of even number to the next.
+    Segments,
+    /// An area that the line from point to point surrounds.
+    Band,
+    /// Filled dots, or the style's shape.
     Dots,
     /// Filled dots whose areas are as the sizes, 0 to 1.
     Bubbles,
@@ -310,6 +456,19 @@ impl Axis {
         }
     }
 
+    /// A line for each name, the first on top; that of number i is at −i.
+    pub fn named(label: &str, names: &[String]) -> Axis {
+        let ticks = names.iter().enumerate().map(|(i, name)| (-(i as f64), name.clone())).collect();
+        Axis { label: label.into(), scale: Scale::Linear { low: 0.5 - names.len() as f64, high: 0.5 }, ticks }
+    }
+
+    /// Logarithmic with ticks at these numbers alone, ascending.
+    pub fn log_at(label: &str, numbers: &[usize]) -> Axis {
+        let mut axis = Axis::log(label, numbers.iter().map(|number| *number as f64));
+        axis.ticks = numbers.iter().map(|number| (*number as f64, number.to_string())).collect();
+        axis
+    }
+
     /// Logarithmic over the positive ones of `values`, with a place for 0 if one is 0.
     pub fn log(label: &str, values: impl Iterator<Item = f64> + Clone) -> Axis {
         let positive = values.clone().filter(|value| *value > 0.0 && value.is_finite());
@@ -342,6 +501,14 @@ impl Axis {
             ticks.push((0.0, "0".into()));
         }
         Axis { label: label.into(), scale: Scale::Log { low, high, zero }, ticks }
+    }
+
+    /// Values at its ends; the place for 0 is beyond.
+    pub fn ends(&self) -> [f64; 2] {
+        match self.scale {
+            Scale::Linear { low, high } => [low, high],
+            Scale::Log { low, high, .. } => [10f64.powf(low), 10f64.powf(high)],
+        }
     }
 
     /// Whether it has a place for that value.
@@ -409,6 +576,30 @@ mod tests {
         assert!(axis.holds(0.0) && !axis.holds(-1.0) && !axis.holds(f64::NAN));
         assert!(!axis.holds(1e-5), "it would stand at the lower end, where it is not");
         assert!(!Axis::log("", [0.1, 1.0].into_iter()).holds(0.0));
+    }
+
+    #[test]
+    fn many_series_have_looks_of_their_own_and_legends_of_several_rows() {
+        let styles: Vec<Style> = (0..24).map(Style::numbered).chain([Style::of_baseline()]).collect();
+        assert!(styles.iter().enumerate().all(|(i, style)| !styles[..i].contains(style)));
+        let series = |i: usize| Series {
+            name: format!("replicas {i}"),
+            style: Style::numbered(i),
+            marks: Marks::Lines,
+            data: points([[1.0, 1.0], [2.0, 0.5]]),
+        };
+        let panel = Panel {
+            title: String::new(),
+            x: Axis::log("", [1.0, 2.0].into_iter()),
+            y: Axis::log("", [1.0, 0.5].into_iter()),
+            series: (0..24).map(series).collect(),
+        };
+        let places = legend_places(&panel, 400.0);
+        assert!(places.iter().all(|[x, _]| x + 29.0 + 10.0 * PIXELS_PER_LETTER <= 400.0));
+        assert!(places.iter().enumerate().all(|(i, place)| !places[..i].contains(place)));
+        let mut page = Page::new(500.0, 400.0);
+        page.panel(Area { x: 0.0, y: 0.0, width: 500.0, height: 400.0 }, &panel);
+        roxmltree::Document::parse(&page.finish()).unwrap();
     }
 
     #[test]
