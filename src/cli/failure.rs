@@ -12,6 +12,10 @@ pub(super) enum Failure {
     Shown(String),
     /// It failed on the way; code 1.
     Running(String),
+    /// All was done, but what came of it is beyond these limits that were set; code 3.
+    Exceeded(Vec<String>),
+    /// A signal ended it with less than was asked for, which is written and can be gone on with; code 130.
+    Interrupted(String),
 }
 
 impl Failure {
@@ -34,6 +38,8 @@ impl Failure {
         match self {
             Failure::Running(_) => ExitCode::from(1),
             Failure::Input(_) | Failure::Shown(_) => ExitCode::from(2),
+            Failure::Exceeded(_) => ExitCode::from(3),
+            Failure::Interrupted(_) => ExitCode::from(130),
         }
     }
 }
@@ -41,9 +47,11 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Failure::Input(reasons) => reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}")),
+            Failure::Input(reasons) | Failure::Exceeded(reasons) => {
+                reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}"))
+            }
             Failure::Shown(text) => f.write_str(text),
-            Failure::Running(reason) => writeln!(f, "error: {reason}"),
+            Failure::Running(reason) | Failure::Interrupted(reason) => writeln!(f, "error: {reason}"),
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Command lines to typed jobs: one file a subcommand.
 
+mod compare;
 mod failure;
 mod info;
 mod ladder;
+mod reference;
 mod render;
 mod scene;
 mod signals;
@@ -26,14 +28,19 @@ enum Command {
     Render(Box<render::Render>),
     Info(info::Info),
     Ladder(ladder::Ladder),
+    Compare(compare::Compare),
+    Reference(Box<reference::Reference>),
 }
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
-  2    nothing was begun: faulty options or scene, no Embree, unwritable files
-  130  ended at once by a second signal, without an image";
+  2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
+  3    relt compare: an image exceeds a --max-… that was given
+       relt reference: --time was over before --target-relmse was reached
+  130  ended at once by a second signal, without an image
+       relt reference: also by the first, before the target was reached; the same command goes on";
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
@@ -49,6 +56,8 @@ pub fn main() -> ExitCode {
         Command::Render(arguments) => render::run(*arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
+        Command::Reference(arguments) => reference::run(*arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
