@@ -16,10 +16,11 @@ use std::{
 
 use relt::{
     embree::Device,
-    film::{Image, exr_file},
+    film::exr_file,
     load,
     render::{self, Job, Method, MltSettings, Normalisation, Observer, Picture, Settings, Status},
     scene::Scene,
+    study::metrics::{Errors, Reference},
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -37,7 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let device = Device::new("")?;
     for name in list("SCENES", "cornell-box,caustic,lattice") {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(&name);
-        let reference = exr_file::read_file(&folder.join("reference.exr"))?.image;
+        // without its variance: the table's errors include the references' own
+        let image = exr_file::read_file(&folder.join("reference.exr"))?.image;
+        let reference = Reference { image, variance: None };
         let scene = Scene::new(&device, load::scene(&folder.join("scene.xml"), &[])?)?;
         let mut runs: Vec<Vec<Run>> = methods.iter().map(|_| Vec::new()).collect();
         for &seed in &seeds {
@@ -76,16 +79,22 @@ struct Run {
     speed: f64,
 }
 
-fn run(scene: &Scene, settings: Settings, seed: u64, times: &[f64], reference: &Image) -> Result<Run, Box<dyn Error>> {
+fn run(
+    scene: &Scene,
+    settings: Settings,
+    seed: u64,
+    times: &[f64],
+    reference: &Reference,
+) -> Result<Run, Box<dyn Error>> {
     let (longest, earlier) = times.split_last().expect("there are times");
     let settings = Settings { seed, time: Some(Duration::from_secs_f64(*longest)), ..settings };
     let job = Job { scene, scene_name: String::new(), settings, stop: &AtomicBool::new(false) };
     let watch = Watch { times: earlier, reference, errors: Mutex::default() };
     let outcome = render::run(&job, &watch)?;
     let mut errors = watch.errors.into_inner()?;
-    let image = &outcome.picture.image;
-    errors.push(image.rel_mse(reference));
-    let brightness = image.mean_ratio(reference);
+    let end = Errors::of(&outcome.picture.image, reference);
+    errors.push(end.rel_mse);
+    let brightness = end.mean_ratio;
     let (value, error) = outcome.status.normalisation.unwrap_or((f64::NAN, f64::NAN));
     let speed = outcome.status.mutations_per_second() * 1e-6;
     Ok(Run { errors, brightness, deviation: (brightness - 1.0) / (error / value), speed })
@@ -116,7 +125,7 @@ fn print(scene: &str, method: &str, runs: &[Run], times: usize) {
 /// Takes the error of the first picture after each of some times.
 struct Watch<'a> {
     times: &'a [f64],
-    reference: &'a Image,
+    reference: &'a Reference,
     errors: Mutex<Vec<f64>>,
 }
 
@@ -128,7 +137,7 @@ impl Observer for Watch<'_> {
 
     fn snapshot(&self, _: &Status, picture: &Picture) {
         if let Ok(mut errors) = self.errors.lock() {
-            errors.push(picture.image.rel_mse(self.reference));
+            errors.push(Errors::of(&picture.image, self.reference).rel_mse);
         }
     }
 }

@@ -25,6 +25,8 @@ pub enum Purpose {
     Scramble = 6,
     /// Turns that blocks take at the pixels.
     Turn = 7,
+    /// Seeds of the passes that a reference is the mean of.
+    Pass = 8,
 }
 
 /// Identifies one call for four random words.

@@ -14,8 +14,10 @@ pub(super) enum Failure {
     Shown(String),
     /// It failed on the way; code 1.
     Running(String),
-    /// A signal ended it before it was done; what is finished is kept, and these words say how to go on; code 130.
-    Stopped(String),
+    /// All was done, but what came of it is beyond these limits that were set; code 3.
+    Exceeded(Vec<String>),
+    /// A signal ended it with less than was asked for, which is written and can be gone on with; code 130.
+    Interrupted(String),
 }
 
 impl Failure {
@@ -29,11 +31,6 @@ impl Failure {
         Failure::Running(reason.to_string())
     }
 
-    /// Ended by a signal, with words on how to go on.
-    pub fn stopped(how_to_go_on: impl fmt::Display) -> Failure {
-        Failure::Stopped(how_to_go_on.to_string())
-    }
-
     /// A fault of an input file, shown in place; colours and frames only where standard error is a terminal.
     pub fn shown(report: impl miette::Diagnostic + Send + Sync + 'static) -> Failure {
         Failure::Shown(format!("{:?}\n", miette::Report::new(report)))
@@ -42,8 +39,9 @@ impl Failure {
     pub fn code(&self) -> ExitCode {
         match self {
             Failure::Running(_) => ExitCode::from(1),
-            Failure::Stopped(_) => ExitCode::from(signals::ENDED_AT_ONCE as u8),
             Failure::Input(_) | Failure::Shown(_) => ExitCode::from(2),
+            Failure::Exceeded(_) => ExitCode::from(3),
+            Failure::Interrupted(_) => ExitCode::from(signals::ENDED as u8),
         }
     }
 }
@@ -51,10 +49,12 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Failure::Input(reasons) => reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}")),
+            Failure::Input(reasons) | Failure::Exceeded(reasons) => {
+                reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}"))
+            }
             Failure::Shown(text) => f.write_str(text),
             Failure::Running(reason) => writeln!(f, "error: {reason}"),
-            Failure::Stopped(how) => writeln!(f, "stopped: {how}"),
+            Failure::Interrupted(reason) => writeln!(f, "stopped: {reason}"),
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Command lines to typed jobs: one file a subcommand.
 
+mod compare;
 mod failure;
 mod info;
 mod ladder;
+mod reference;
 mod render;
 mod scene;
 mod signals;
@@ -28,14 +30,19 @@ enum Command {
     Info(info::Info),
     Ladder(ladder::Ladder),
     Study(study::StudyArguments),
+    Compare(compare::Compare),
+    Reference(Box<reference::Reference>),
 }
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
-  2    nothing was begun: faulty options or scene, no Embree, unwritable files
-  130  ended at once by a second signal, without an image; a study that was stopped, with what is finished kept";
+  2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
+  3    relt compare: an image exceeds a --max-… that was given
+       relt reference: --time was over before --target-relmse was reached
+  130  ended at once by a second signal, without an image
+       relt reference, relt study: also by the first, before all was done; the same command goes on";
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
@@ -52,6 +59,8 @@ pub fn main() -> ExitCode {
         Command::Info(arguments) => info::run(arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
         Command::Study(arguments) => study::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
+        Command::Reference(arguments) => reference::run(*arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use super::failure::Failure;
 
 /// What shells expect of a program that Ctrl-C ended.
-pub(super) const ENDED_AT_ONCE: i32 = 130;
+pub(super) const ENDED: i32 = 130;
 
 /// The flag that the first signal raises.
 pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
@@ -15,7 +15,7 @@ pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     let raised = stop.clone();
     ctrlc::set_handler(move || {
         if raised.swap(true, Relaxed) {
-            process::exit(ENDED_AT_ONCE);
+            process::exit(ENDED);
         }
     })
     .map_err(|error| Failure::running(format_args!("cannot listen to Ctrl-C: {error}")))?;

@@ -118,7 +118,9 @@ fn work(runner: &Runner, jobs: &[StudyJob], display: &Display) -> Result<(), Fai
                 pace.took(job, begin.elapsed());
                 display.done(&format!("{heading}: {:.1} s", begin.elapsed().as_secs_f64()));
             }
-            Err(RunError::Stopped) => return Err(Failure::stopped("the same command goes on where this one stopped")),
+            Err(RunError::Stopped) => {
+                return Err(Failure::Interrupted("the same command goes on where this one stopped".into()));
+            }
             Err(RunError::Failed(reason)) => return Err(Failure::running(format_args!("{what}: {reason}"))),
         }
     }

@@ -165,44 +165,173 @@ impl Errors {
     pub fn of(image: &Image, reference: &Reference) -> Errors {
         let truth = &reference.image;
         assert_eq!((image.width, image.height), (truth.width, truth.height), "images of different sizes");
-        let variances = reference.variance.as_ref().map(|image| image.pixels.as_flattened());
-        let mut sums = Errors::default();
-        let (mut ours, mut theirs, mut variance) = (0.0, 0.0, 0.0);
-        for (i, (&x, &r)) in image.pixels.as_flattened().iter().zip(truth.pixels.as_flattened()).enumerate() {
-            let (x, r) = (f64::from(x), f64::from(r));
-            let v = variances.map_or(0.0, |variances| f64::from(variances[i]));
+        let [mse, rel_mse, smape, ours, theirs, variance, noise] = means(reference, |i, r, v| {
+            let x = f64::from(image.pixels.as_flattened()[i]);
             let (square, weight) = ((x - r).powi(2) - v, 1.0 / (r * r + FLOOR));
-            sums.mse += square;
-            sums.rel_mse += square * weight;
-            sums.reference_rel_mse += v * weight;
-            if x != r {
-                sums.smape += 2.0 * (x - r).abs() / (x.abs() + r.abs());
-            }
-            ours += x;
-            theirs += r;
-            variance += v;
-        }
+            let smape = if x == r { 0.0 } else { 2.0 * (x - r).abs() / (x.abs() + r.abs()) };
+            [square, square * weight, smape, x, r, v, v * weight]
+        });
         let n = truth.pixels.as_flattened().len() as f64;
         Errors {
-            mse: sums.mse / n,
-            rel_mse: sums.rel_mse / n,
-            smape: sums.smape / n,
+            mse,
+            rel_mse,
+            smape,
             mean_ratio: ours / theirs,
-            mean_ratio_error: ours / theirs * variance.sqrt() / theirs,
-            reference_rel_mse: sums.reference_rel_mse / n,
+            mean_ratio_error: ours / theirs * (variance / n).sqrt() / theirs,
+            reference_rel_mse: noise,
         }
     }
+
+    /// Root of the mean squared error; 0 where the corrected square is below 0.
+    pub fn rmse(&self) -> f64 {
+        self.mse.max(0.0).sqrt()
+    }
+}
+
+/// Errors of a reference by its own variance: what they amount to for an image that is exactly right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// mean(v).
+    pub mse: f64,
+    /// mean(v / (r² + 0.01)).
+    pub rel_mse: f64,
+}
+
+impl Reference {
+    /// Its own noise, where the file tells it.
+    pub fn noise(&self) -> Option<Noise> {
+        self.variance.as_ref()?;
+        let [mse, rel_mse] = means(self, |_, r, v| [v, v / (r * r + FLOOR)]);
+        Some(Noise { mse, rel_mse })
+    }
+}
+
+/// Means over pixels and channels of what `terms` makes of a value's number, the reference there and its variance (0
+/// where that is not known).
+///
+/// Sums are taken a row at a time and then over rows, so that rounding grows with the sides of an image and not with its
+/// area.
+fn means<const N: usize>(reference: &Reference, terms: impl Fn(usize, f64, f64) -> [f64; N]) -> [f64; N] {
+    let add = |mut sums: [f64; N], terms: [f64; N]| {
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        sums
+    };
+    let truth = reference.image.pixels.as_flattened();
+    let variances = reference.variance.as_ref().map(|image| image.pixels.as_flattened());
+    let row = 3 * reference.image.width as usize;
+    let of = |i: usize| terms(i, f64::from(truth[i]), variances.map_or(0.0, |variances| f64::from(variances[i])));
+    let of_row = |y: usize| (y * row..(y + 1) * row).map(of).fold([0.0; N], add);
+    let sums = (0..reference.image.height as usize).map(of_row).fold([0.0; N], add);
+    sums.map(|sum| sum / truth.len() as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rng::{Counter, Purpose, Rng, unit_f32};
 
     fn reference(width: u32, height: u32, variance: impl Fn(usize) -> f32) -> Reference {
         let n = (width * height) as usize;
         let image = Image::new(width, height, (0..n).map(|i| [i as f32, 2.0 * i as f32, 0.5]).collect());
         let variance = Image::new(width, height, (0..n).map(|i| [variance(i), 1.0, 0.0]).collect());
         Reference { image, variance: Some(variance) }
+    }
+
+    /// One row of two pixels, with every term of the formulas written out.
+    #[test]
+    fn errors_are_what_their_formulas_say() {
+        let image = Image::new(2, 1, vec![[1.5, 0.5, 0.0], [1.0, 0.25, 0.0]]);
+        let truth = Image::new(2, 1, vec![[1.0, 0.5, 0.0], [2.0, 0.0, 0.5]]);
+        let squares = [0.25, 0.0, 0.0, 1.0, 0.0625, 0.25];
+        let floors = [1.01, 0.26, 0.01, 4.01, 0.01, 0.26];
+        let mean = |terms: [f64; 6]| terms.iter().sum::<f64>() / 6.0;
+        let over = |terms: [f64; 6]| mean(std::array::from_fn(|i| terms[i] / floors[i]));
+
+        let plain = Errors::of(&image, &Reference { image: truth.clone(), variance: None });
+        assert!((plain.mse - mean(squares)).abs() < 1e-15);
+        assert!((plain.rmse() - mean(squares).sqrt()).abs() < 1e-15);
+        assert!((plain.rel_mse - over(squares)).abs() < 1e-14);
+        assert!((plain.smape - mean([0.4, 0.0, 0.0, 2.0 / 3.0, 2.0, 2.0])).abs() < 1e-15, "a pair of zeros counts 0");
+        assert!((plain.mean_ratio - 3.25 / 4.0).abs() < 1e-15);
+        assert_eq!((plain.mean_ratio_error, plain.reference_rel_mse), (0.0, 0.0));
+
+        let variances = [0.125, 0.0, 0.0625, 0.25, 0.0, 0.5];
+        let variance = Image::new(2, 1, vec![[0.125, 0.0, 0.0625], [0.25, 0.0, 0.5]]);
+        let reference = Reference { image: truth, variance: Some(variance) };
+        let corrected = Errors::of(&image, &reference);
+        assert!((corrected.mse - (mean(squares) - mean(variances))).abs() < 1e-15);
+        assert!((corrected.rel_mse - (over(squares) - over(variances))).abs() < 1e-14);
+        assert!((corrected.reference_rel_mse - over(variances)).abs() < 1e-14);
+        assert_eq!((corrected.smape, corrected.mean_ratio), (plain.smape, plain.mean_ratio), "these are not corrected");
+        // Σ r = 4 has the variance Σ v = 0.9375
+        assert!((corrected.mean_ratio_error - 3.25 / 4.0 * 0.9375f64.sqrt() / 4.0).abs() < 1e-15);
+        let noise = reference.noise().unwrap();
+        assert!((noise.mse - mean(variances)).abs() < 1e-15 && noise.rel_mse == corrected.reference_rel_mse);
+    }
+
+    #[test]
+    fn an_equal_image_has_no_error() {
+        let reference = reference(3, 2, |_| 0.0);
+        let errors = Errors::of(&reference.image, &Reference { variance: None, ..reference.clone() });
+        assert_eq!(errors, Errors { mean_ratio: 1.0, ..Errors::default() });
+        let corrected = Errors::of(&reference.image, &reference);
+        assert!(corrected.mse < 0.0 && corrected.rmse() == 0.0, "closer than the noise lets expect");
+    }
+
+    /// Pairs x = t + a, r = t + b with independent noise a, b: corrected errors are those of a alone.
+    ///
+    /// Over 64² · 3 values the mean of (a − b)² − v has a relative standard error of about √2 · 2/√12288 = 2.6 % of
+    /// E[a²]; twice that each way keeps a wrong correction (by E[b²] = E[a²]) far off.
+    #[test]
+    fn the_correction_leaves_the_error_of_the_image_alone() {
+        const N: u32 = 64;
+        let rng = Rng::new(1);
+        let noise = |replica, i: u32| {
+            let counter = Counter { ladder: i, replica, step: 0, purpose: Purpose::Primary };
+            let [r, g, b, _] = rng.words(counter, 0).map(|word| unit_f32(word) - 0.5);
+            [4.0 + r, 4.0 + g, 4.0 + b]
+        };
+        let [image, truth] = [0, 1].map(|which| Image::new(N, N, (0..N * N).map(|i| noise(which, i)).collect()));
+        let variance = 1.0 / 12.0; // of a number that is uniform in an interval of length 1
+        let reference = Reference { image: truth, variance: Some(Image::constant(N, N, [variance as f32; 3])) };
+        let errors = Errors::of(&image, &reference);
+        assert!((errors.mse / variance - 1.0).abs() < 0.06, "{}", errors.mse);
+        let plain = Errors::of(&image, &Reference { variance: None, ..reference.clone() });
+        assert!((plain.mse / variance - 2.0).abs() < 0.06, "{}", plain.mse);
+    }
+
+    #[test]
+    fn faults_of_a_reference_are_all_told_with_their_places() {
+        let of = |image: &Image, layers: &[(String, Plane)]| {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("r.exr");
+            exr_file::write(&path, image, layers, &[]).unwrap();
+            let place = format!("{}: ", path.display());
+            Reference::read(&path)
+                .map_err(|faults| faults.iter().map(|fault| fault.replace(&place, "")).collect::<Vec<_>>())
+        };
+        let good = reference(3, 2, |i| i as f32);
+        let layer = |image: &Image| vec![(VARIANCE.to_owned(), Plane::Rgb(image.clone()))];
+        let variance = good.variance.clone().unwrap();
+        assert_eq!(of(&good.image, &layer(&variance)), Ok(good.clone()));
+        assert_eq!(of(&good.image, &[]).unwrap().variance, None);
+
+        let (mut image, mut negative) = (good.image.clone(), variance);
+        image.pixels[5][1] = f32::INFINITY;
+        image.pixels[4][2] = f32::NAN;
+        negative.pixels[2][0] = -0.5;
+        let faults = of(&image, &layer(&negative)).unwrap_err();
+        assert_eq!(
+            faults,
+            [
+                "pixel (1, 1), channel B: NaN is not finite (the first of 2 such values)",
+                "pixel (2, 0), channel variance.R: -0.5 is not finite or below 0"
+            ]
+        );
+        let gray = of(&good.image, &[("variance".into(), Plane::Gray(vec![0.0; 6]))]).unwrap_err();
+        assert!(gray[0].contains("variance.R, variance.G, variance.B"), "{gray:?}");
+        let nowhere = Reference::read(Path::new("nowhere.exr")).unwrap_err();
+        assert!(nowhere.len() == 1 && nowhere[0].contains("cannot read nowhere.exr"), "{nowhere:?}");
     }
 
     #[test]
