@@ -54,6 +54,7 @@ pub(super) fn run(arguments: StudyArguments) -> Result<(), Failure> {
         return list(&study, &jobs, &output);
     }
     let folder = Folder::open(&output).map_err(Failure::input)?;
+    folder.keep_references(&study, &prepared).map_err(Failure::running)?;
     let stop = signals::stop_flag()?;
     let runner = Runner { study: &study, prepared: &prepared, folder: &folder, program: this_program(), stop: &stop };
     let ended = work(&runner, &jobs, &Display::new(arguments.quiet));

@@ -1,7 +1,7 @@
 //! From the folder of a study to its results.
 
 use super::file::Study;
-use super::jobs::{Prepared, StudyJob, quoted, scene_words};
+use super::jobs::{Prepared, StudyJob, quoted, reference_image, scene_words};
 use super::record::{Moment, Record, read};
 use super::results::{Clock, LadderEnd, MethodResults, Results, Run, SceneResults, Snapshot, Stage};
 use super::runner::Folder;
@@ -15,7 +15,7 @@ pub fn collect(
     folder: &Folder,
     command: &str,
 ) -> Result<Results, FileError> {
-    let mut results = outline(study, prepared, command);
+    let mut results = outline(study, prepared, folder, command);
     let mut lacking = 0;
     for job in jobs {
         let path = job.record(folder.path());
@@ -36,7 +36,7 @@ pub fn collect(
 }
 
 /// The results before any run.
-fn outline(study: &Study, prepared: &[Prepared], command: &str) -> Results {
+fn outline(study: &Study, prepared: &[Prepared], folder: &Folder, command: &str) -> Results {
     let methods = study.methods.iter().map(|method| MethodResults {
         name: method.name.clone(),
         options: method.options.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
@@ -48,7 +48,7 @@ fn outline(study: &Study, prepared: &[Prepared], command: &str) -> Results {
         name: scene.name.clone(),
         scene: scene_words(study, i),
         size: prepared.size,
-        reference: scene.reference.clone(),
+        reference: folder.path().join(reference_image(study, i)),
         target_errors: scene.target_errors.clone(),
         methods: methods.clone(),
     });

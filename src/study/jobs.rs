@@ -127,6 +127,11 @@ fn file_name(name: &str) -> String {
     words.collect::<Vec<_>>().join("-").to_lowercase()
 }
 
+/// The copy of a scene's reference, from the study's folder on.
+pub fn reference_image(study: &Study, scene: usize) -> PathBuf {
+    Path::new("images").join(format!("{}-reference-{}.exr", file_name(&study.scenes[scene].name), scene + 1))
+}
+
 /// Whether a run's images are kept at every snapshot, not only at its end: those of the first seed, for the viewer.
 pub fn keeps_images(study: &Study, seed: u64) -> bool {
     study.seeds.first() == Some(&seed)

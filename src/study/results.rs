@@ -89,7 +89,7 @@ pub struct SceneResults {
     pub scene: String,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// The reference's file, with the size above.
+    /// A copy of the reference, with the size above.
     pub reference: PathBuf,
     /// Errors (√relMSE) for which the time to reach them is told, greatest first; empty: as the report sees fit.
     pub target_errors: Vec<f64>,

@@ -9,12 +9,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::file::{Budget, Study};
-use super::jobs::{Prepared, StudyJob, keeps_images, scene_words};
+use super::jobs::{Prepared, StudyJob, keeps_images, reference_image, scene_words};
 use super::metrics::{Errors, Reference};
 use super::record::{JobEnd, JobHead, Moment, SharedFile};
 use crate::embree::Device;
-use crate::film::exr_file;
 use crate::film::file::FileError;
+use crate::film::{Plane, exr_file};
 use crate::load;
 use crate::render::clock::cpu_time;
 use crate::render::log::Log;
@@ -77,6 +77,18 @@ impl Folder {
             Err(TryLockError::WouldBlock) => Err(FileError::write(path, "another relt is at work in it")),
             Err(TryLockError::Error(error)) => Err(FileError::write(&lock, error)),
         }
+    }
+
+    /// Keeps a copy of every scene's reference, at the size of the scene's picture, so that the folder has all that
+    /// its report shows.
+    pub fn keep_references(&self, study: &Study, prepared: &[Prepared]) -> Result<(), FileError> {
+        for (i, prepared) in prepared.iter().enumerate() {
+            let path = self.path.join(reference_image(study, i));
+            let Reference { image, variance } = &prepared.reference;
+            let layers: Vec<_> = variance.iter().map(|v| ("variance".to_owned(), Plane::Rgb(v.clone()))).collect();
+            exr_file::write(&path, image, &layers, &[])?;
+        }
+        Ok(())
     }
 
     /// Where it is.
