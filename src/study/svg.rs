@@ -253,9 +253,19 @@ impl Page {
         self.text([x, y], 12.0, Anchor::Middle, &turned, &panel.y.label);
     }
 
-    /// Draws a series and returns how many marks it has.
+    /// Draws a series, which pointing at it names, and returns how many marks it has.
     fn series(&mut self, plot: Area, panel: &Panel, number: usize) -> usize {
         let series = &panel.series[number];
+        if series.name.is_empty() {
+            return self.marks(plot, panel, series);
+        }
+        self.body += &format!("<g><title>{}</title>\n", escaped(&series.name));
+        let drawn = self.marks(plot, panel, series);
+        self.body += "</g>\n";
+        drawn
+    }
+
+    fn marks(&mut self, plot: Area, panel: &Panel, series: &Series) -> usize {
         let bottom = plot.y + plot.height;
         let x = |value: f64| plot.x + plot.width * panel.x.place(value);
         let y = |value: f64| bottom - plot.height * panel.y.place(value);
@@ -437,7 +447,7 @@ impl Axis {
         let (first, last) = ((low / step + 1e-9).floor(), (high / step - 1e-9).ceil());
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let name = |value: f64| match step {
-            0.0001..100_000.0 => format!("{value:.decimals$}"),
+            0.0001..100_000.0 => format!("{value:.decimals$}").replace('-', "−"),
             _ => format!("{value:.2e}"),
         };
         let ticks = (0..=(last - first) as usize).map(|i| (first + i as f64) * step).map(|v| (v, name(v))).collect();

@@ -1,7 +1,7 @@
 //! The page: HTML that is well-formed XML as well, without anything from elsewhere.
 
 use super::charts::{self, Chart, Styles};
-use super::figures::{BEST, Cell, FLAG, Table, with};
+use super::figures::{BEST, Cell, FLAG, Table, short_with};
 use super::pictures::{Picture, colour_strip, pictures};
 use super::tables;
 use crate::render::progress::significant;
@@ -130,7 +130,7 @@ fn warning_list(warnings: &[&String]) -> String {
         return String::new();
     }
     let items: String = warnings.iter().map(|warning| format!("<li>{}</li>\n", escaped(warning))).collect();
-    format!("<aside class=\"warnings\">\n<h2>Mind</h2>\n<ul>\n{items}</ul>\n</aside>\n")
+    format!("<aside class=\"warnings\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</aside>\n")
 }
 
 fn summary_section(styles: &Styles, summaries: &[SceneSummary]) -> String {
@@ -235,10 +235,10 @@ fn viewer(number: usize, scene: &SceneSummary, pictures: &[Picture]) -> String {
     }
     let [width, height] = scene.scene.size;
     let thumbnails: String = pictures.iter().map(|picture| thumbnail(picture, [width, height])).collect();
-    let time = with(scene.equal_time, "s");
+    let time = short_with(scene.equal_time, "s");
     format!(
         "<h3>Images at equal time</h3>\n<p>Each method's first seed at its snapshot closest to {time}, the latest time \
-         that all runs reach; the actual time stands below. Exposure 1 for all: linear 1 is white.</p>\n\
+         that all runs reach; its own time stands below it. Exposure 1 for all: linear 1 is white.</p>\n\
          <div class=\"images\" data-width=\"{width}\" data-height=\"{height}\">\n\
          <div class=\"viewer\" hidden=\"hidden\">\n<div class=\"controls\">\n\
          <label>Left <select class=\"left\"></select></label>\n\
@@ -269,8 +269,11 @@ fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
         Some(source) => {
             let error = error(&source.snapshot.errors).map_or("–".into(), |error| significant(error, 3));
             let name = source.method.name.clone();
-            let facts =
-                format!("{}, √relMSE {error}, seed {}", with(Some(source.snapshot.seconds), "s"), source.run.seed);
+            let facts = format!(
+                "{}, √relMSE {error}, seed {}",
+                short_with(Some(source.snapshot.seconds), "s"),
+                source.run.seed
+            );
             let errors = picture.errors.as_ref().map(|errors| image(&format!("errors of {name}"), errors));
             (name, facts, errors.unwrap_or_default())
         }
@@ -320,8 +323,8 @@ fn method_section(results: &Results) -> String {
     }
     format!(
         "<section id=\"methods\">\n<h2>Methods</h2>\n<div class=\"table\">\n<table>\n<thead><tr><th \
-         scope=\"col\">method</th><th scope=\"col\">options</th><th scope=\"col\">a command that repeats its first \
-         run</th></tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n</div>\n{}</section>\n",
+         scope=\"col\">method</th><th class=\"words\" scope=\"col\">options</th><th class=\"words\" scope=\"col\">a \
+         command that repeats its first run</th></tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n</div>\n{}</section>\n",
         run_warnings(results)
     )
 }
@@ -380,7 +383,8 @@ fn explanation_section(results: &Results, summaries: &[SceneSummary]) -> String 
         (
             "Speed-up",
             "Median time of the baseline over that of the method. Intervals are the middle 95 % of 1000 bootstrap \
-             resamples of the runs of both; with few runs they are coarse. An end that no resample has seen is open: >."
+             resamples of the runs of both; with few runs they are coarse. > and < stand where the error was not reached, or before the first \
+             snapshot."
                 .into(),
         ),
         (
@@ -406,8 +410,8 @@ fn explanation_section(results: &Results, summaries: &[SceneSummary]) -> String 
         ),
         (
             "Efficiency",
-            "1/(relMSE · seconds) at the end, median over runs. It takes no account of the time at which it was \
-             reached, if errors fall as they should."
+            "1/(relMSE · seconds) at the end, median over runs. If errors fall as 1/√time, it is the same \
+             whenever runs end."
                 .into(),
         ),
         (
