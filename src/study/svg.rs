@@ -466,9 +466,14 @@ impl Axis {
         }
     }
 
-    /// A line for each name, the first on top; that of number i is at −i.
+    /// A line for each name, the first on top; that of number i is at −i. Long names are cut.
     pub fn named(label: &str, names: &[String]) -> Axis {
-        let ticks = names.iter().enumerate().map(|(i, name)| (-(i as f64), name.clone())).collect();
+        const LONGEST: usize = 32;
+        let cut = |name: &String| match name.char_indices().nth(LONGEST) {
+            Some(_) => name.chars().take(LONGEST - 1).chain(['…']).collect(),
+            None => name.clone(),
+        };
+        let ticks = names.iter().enumerate().map(|(i, name)| (-(i as f64), cut(name))).collect();
         Axis { label: label.into(), scale: Scale::Linear { low: 0.5 - names.len() as f64, high: 0.5 }, ticks }
     }
 

@@ -81,7 +81,9 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
         (Against::Seconds, Clock::Cpu) => "processor seconds by thread",
     };
     let x = Axis::log(x_label, [first, last].into_iter());
-    let bounds: Vec<f64> = moments().flat_map(|moment| [moment.error.low, moment.error.high]).collect();
+    let bounds: Vec<f64> = moments()
+        .flat_map(|Moment { error, .. }| if has_bands(scene) { [error.low, error.high] } else { [error.median; 2] })
+        .collect();
     let y = Axis::log("√relMSE", bounds.iter().copied());
     let mut all = vec![guide(&x, &y, moments().map(|moment| [moment.at, moment.error.median]))];
     let [bottom, top] = y.ends();
@@ -89,7 +91,9 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
         let style = styles.style(&method.method.name);
         let low = moments.iter().map(|moment| [moment.at, moment.error.low]);
         let high = moments.iter().rev().map(|moment| [moment.at, moment.error.high]);
-        all.push(series("", style, Marks::Band, low.chain(high)));
+        if has_bands(scene) {
+            all.push(series("", style, Marks::Band, low.chain(high)));
+        }
         let set_up = method.set_up.filter(|at| against == Against::Seconds && *at > x.ends()[0] && *at < x.ends()[1]);
         let short = bottom.powf(0.95) * top.powf(0.05);
         all.push(series(
@@ -113,6 +117,12 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
     let title = format!("{}: error against {noun}", scene.scene.name);
     let words = format!("{title}, both logarithmic, a line for each of {} methods", scene.methods.len());
     Some(chart(scene, what, words, SIZE, &Panel { title, x, y, series: all }))
+}
+
+/// Whether bands over runs can be told from one another.
+pub fn has_bands(scene: &SceneSummary) -> bool {
+    const MOST: usize = 8;
+    scene.methods.len() <= MOST
 }
 
 /// A line of slope −½ through the middle of what is drawn, cut at the frame.

@@ -154,7 +154,10 @@ fn scene_section(
     pictures: &[Picture],
 ) -> String {
     let runs = scene.methods.iter().map(|method| method.method.runs.len()).max().unwrap_or(0);
-    let caption = format!("Median over seeds; band: {}.", Spread::ends(runs));
+    let caption = match charts::has_bands(scene) {
+        true => format!("Median over seeds; band: {}.", Spread::ends(runs)),
+        false => "Median over seeds; bands would hide one another, and are in the table of errors.".into(),
+    };
     let curves: String = curves(results, styles, scene)
         .iter()
         .zip([format!("{caption} Short lines at the bottom: set-up is over."), caption.clone()])
@@ -257,10 +260,10 @@ fn viewer(number: usize, scene: &SceneSummary, pictures: &[Picture]) -> String {
 }
 
 fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
-    let image = |name: &str, data: &str| {
+    let image = |class: &str, name: &str, data: &str| {
         let name = escaped(name);
         format!(
-            "<div class=\"frame\"><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{name}\" \
+            "<div class=\"{class}\"><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{name}\" \
              data-name=\"{name}\"/></div>\n"
         )
     };
@@ -274,13 +277,14 @@ fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
                 short_with(Some(source.snapshot.seconds), "s"),
                 source.run.seed
             );
-            let errors = picture.errors.as_ref().map(|errors| image(&format!("errors of {name}"), errors));
+            let errors =
+                picture.errors.as_ref().map(|errors| image("frame errors", &format!("errors of {name}"), errors));
             (name, facts, errors.unwrap_or_default())
         }
     };
     format!(
         "<figure>\n{}{second}<figcaption><b>{}</b> {}</figcaption>\n</figure>\n",
-        image(&name, &picture.image),
+        image("frame", &name, &picture.image),
         escaped(&name),
         escaped(&facts)
     )
@@ -288,7 +292,7 @@ fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
 
 /// What the colours of error maps mean.
 fn scale() -> String {
-    let labels = ["−100 %", "−25 %", "0", "+25 %", "+100 %"].map(|label| format!("<span>{label}</span>"));
+    let labels = ["−100", "−25", "0", "+25", "+100 %"].map(|label| format!("<span>{label}</span>"));
     format!(
         "<div class=\"scale\">\n<p>Errors: (x − r)/√(r² + 0.01) of luminances</p>\n<img src=\"{}\" width=\"201\" \
          height=\"1\" alt=\"colours of errors\"/>\n<p class=\"ticks\">{}</p>\n<p class=\"ends\"><span>too dark</span>\
