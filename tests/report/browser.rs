@@ -15,15 +15,25 @@ use tungstenite::{Message, WebSocket};
 /// Machines of continuous integration may be slow to start a browser.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// A browser with one page; ended when dropped.
+/// A browser with one page; closed when dropped.
 pub struct Browser {
-    process: Child,
+    process: Process,
     socket: WebSocket<TcpStream>,
     session: String,
     last_id: u64,
     /// What the page has reported so far.
     events: Vec<Value>,
     _profile: TempDir,
+}
+
+/// A program that does not outlive the test.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill(); // which has no effect on what has ended
+        let _ = self.0.wait();
+    }
 }
 
 /// The browser's program: the one that `RELT_CHROMIUM` names, or the first that is in the path.
@@ -40,7 +50,7 @@ impl Browser {
     /// Starts `program` with a profile of its own.
     pub fn start(program: &Path) -> Browser {
         let profile = tempfile::tempdir().unwrap();
-        let mut process = Command::new(program)
+        let process = Command::new(program)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
             .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
             .args(["--disable-dev-shm-usage", "--hide-scrollbars", "--force-color-profile=srgb"])
@@ -51,7 +61,8 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .unwrap_or_else(|error| panic!("cannot start {}: {error}", program.display()));
-        let (port, path) = address(&mut process, &profile.path().join("DevToolsActivePort"));
+        let mut process = Process(process);
+        let (port, path) = address(&mut process.0, &profile.path().join("DevToolsActivePort"));
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let (socket, _) = tungstenite::client(format!("ws://127.0.0.1:{port}{path}"), stream).unwrap();
@@ -174,13 +185,11 @@ impl Drop for Browser {
         let asked = self.socket.send(Message::text(close.to_string()));
         let start = Instant::now();
         while asked.is_ok() && start.elapsed() < Duration::from_secs(10) {
-            if matches!(self.process.try_wait(), Ok(Some(_))) {
+            if !matches!(self.process.0.try_wait(), Ok(None)) {
                 return;
             }
             sleep(Duration::from_millis(20));
         }
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 
@@ -193,11 +202,7 @@ fn address(process: &mut Child, file: &Path) -> (u16, String) {
             return (port.parse().unwrap(), path.to_owned());
         }
         let ended = process.try_wait().unwrap();
-        if ended.is_some() || start.elapsed() > PATIENCE {
-            let _ = process.kill();
-            let _ = process.wait();
-            panic!("the browser does not listen ({ended:?})");
-        }
+        assert!(ended.is_none() && start.elapsed() < PATIENCE, "the browser does not listen ({ended:?})");
         sleep(Duration::from_millis(20));
     }
 }

@@ -102,6 +102,12 @@ fn a_study_without_runs_or_images_has_a_page_all_the_same() {
 }
 
 #[test]
+fn a_folder_that_is_not_there_is_told() {
+    let error = report::write(&Results::default(), Path::new("nowhere")).unwrap_err().to_string();
+    assert!(error.contains("report.html") && error.contains("no folder nowhere"), "{error}");
+}
+
+#[test]
 fn errors_below_what_the_reference_tells_leave_gaps_and_no_nonsense() {
     let folder = folder("below-reference");
     let mut results = study::study(&folder);

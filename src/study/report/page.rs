@@ -181,14 +181,27 @@ fn scene_section(
     };
     format!(
         "<section id=\"scene-{number}\" class=\"scene\">\n<h2>{}</h2>\n<p class=\"note\"><code>{}</code>, {} × {} \
-         pixels</p>\n{}<div class=\"charts\">\n{curves}</div>\n{}{scaling}</section>\n",
+         pixels. {}</p>\n{}<div class=\"charts\">\n{curves}</div>\n{}{scaling}</section>\n",
         escaped(&scene.scene.name),
         escaped(&scene.scene.scene),
         scene.scene.size[0],
         scene.scene.size[1],
+        escaped(&reference_noise(scene)),
         viewer(number, scene, pictures),
         all.concat(),
     )
+}
+
+/// What the reference can tell.
+fn reference_noise(scene: &SceneSummary) -> String {
+    let mut runs = scene.methods.iter().flat_map(|method| &method.method.runs);
+    match runs.next().map(|run| run.end().errors.reference_rel_mse) {
+        Some(noise) if noise > 0.0 => {
+            format!("The reference's own noise, √relMSE {}, is subtracted.", significant(noise.sqrt(), 2))
+        }
+        Some(_) => "The reference's own noise is not known, and not subtracted.".into(),
+        None => String::new(),
+    }
 }
 
 fn figure(chart: &Chart, caption: &str) -> String {
@@ -434,7 +447,9 @@ fn origin_section(results: &Results) -> String {
     let list = |items: &[String]| items.iter().map(|item| escaped(item)).collect::<Vec<_>>().join("<br/>");
     format!(
         "<section id=\"origin\">\n<h2>Origin</h2>\n<dl class=\"terms\">\n<dt>Command</dt>\n<dd><code>{}</code></dd>\n\
-         <dt>Programs</dt>\n<dd>{}</dd>\n<dt>Machines</dt>\n<dd>{}</dd>\n</dl>\n<details>\n<summary>Study file\
+         <dt>Programs</dt>\n<dd>{}</dd>\n<dt>Machines</dt>\n<dd>{}</dd>\n<dt>Data</dt>\n\
+         <dd><code>results.csv</code> beside this page has a line for each snapshot of each run, <code>plots</code> the \
+         charts as SVG.</dd>\n</dl>\n<details>\n<summary>Study file\
          </summary>\n<pre>{}</pre>\n</details>\n</section>\n",
         escaped(&results.command),
         list(&results.programs),

@@ -45,8 +45,8 @@ pub fn summary(scene: &SceneSummary) -> Table {
     let mut rows: Vec<Vec<Cell>> = rows.collect();
     let of = |value: &dyn Fn(&MethodSummary) -> Option<f64>| scene.methods.iter().map(value).collect::<Vec<_>>();
     mark_best(&mut rows, 1, &of(&|method| method.end_error.map(|error| error.median)), false);
-    mark_best(&mut rows, 2, &of(&|method| speed_up(method).map(|ratio| ratio.value.value())), true);
-    mark_best(&mut rows, 5, &of(&|method| method.efficiency_ratio.map(|ratio| ratio.value.value())), true);
+    mark_best(&mut rows, 2, &of(&|method| speed_up(method)?.value.at_least()), true);
+    mark_best(&mut rows, 5, &of(&|method| method.efficiency_ratio?.value.at_least()), true);
     let [width, height] = scene.scene.size;
     let goal = target.map_or(String::new(), |(_, error)| format!(", speed-up to √relMSE {}", short(error)));
     Table {
@@ -91,8 +91,7 @@ pub fn times(scene: &SceneSummary) -> Table {
     let targets = scene.targets.iter().map(|target| format!("to {}", short(*target)));
     let mut rows: Vec<Vec<Cell>> = rows.collect();
     for i in 0..scene.targets.len() {
-        let values: Vec<_> =
-            scene.methods.iter().map(|method| method.speed_ups[i].map(|ratio| ratio.value.value())).collect();
+        let values: Vec<_> = scene.methods.iter().map(|method| method.speed_ups[i]?.value.at_least()).collect();
         mark_best(&mut rows, i + 1, &values, true);
     }
     Table {
