@@ -253,9 +253,19 @@ impl Page {
         self.text([x, y], 12.0, Anchor::Middle, &turned, &panel.y.label);
     }
 
-    /// Draws a series and returns how many marks it has.
+    /// Draws a series, which pointing at it names, and returns how many marks it has.
     fn series(&mut self, plot: Area, panel: &Panel, number: usize) -> usize {
         let series = &panel.series[number];
+        if series.name.is_empty() {
+            return self.marks(plot, panel, series);
+        }
+        self.body += &format!("<g><title>{}</title>\n", escaped(&series.name));
+        let drawn = self.marks(plot, panel, series);
+        self.body += "</g>\n";
+        drawn
+    }
+
+    fn marks(&mut self, plot: Area, panel: &Panel, series: &Series) -> usize {
         let bottom = plot.y + plot.height;
         let x = |value: f64| plot.x + plot.width * panel.x.place(value);
         let y = |value: f64| bottom - plot.height * panel.y.place(value);
@@ -437,7 +447,7 @@ impl Axis {
         let (first, last) = ((low / step + 1e-9).floor(), (high / step - 1e-9).ceil());
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let name = |value: f64| match step {
-            0.0001..100_000.0 => format!("{value:.decimals$}"),
+            0.0001..100_000.0 => format!("{value:.decimals$}").replace('-', "−"),
             _ => format!("{value:.2e}"),
         };
         let ticks = (0..=(last - first) as usize).map(|i| (first + i as f64) * step).map(|v| (v, name(v))).collect();
@@ -456,9 +466,14 @@ impl Axis {
         }
     }
 
-    /// A line for each name, the first on top; that of number i is at −i.
+    /// A line for each name, the first on top; that of number i is at −i. Long names are cut.
     pub fn named(label: &str, names: &[String]) -> Axis {
-        let ticks = names.iter().enumerate().map(|(i, name)| (-(i as f64), name.clone())).collect();
+        const LONGEST: usize = 32;
+        let cut = |name: &String| match name.char_indices().nth(LONGEST) {
+            Some(_) => name.chars().take(LONGEST - 1).chain(['…']).collect(),
+            None => name.clone(),
+        };
+        let ticks = names.iter().enumerate().map(|(i, name)| (-(i as f64), cut(name))).collect();
         Axis { label: label.into(), scale: Scale::Linear { low: 0.5 - names.len() as f64, high: 0.5 }, ticks }
     }
 

@@ -1,5 +1,6 @@
 //! The charts of a report.
 
+use super::figures::short;
 use crate::render::progress::significant;
 use crate::study::results::{Clock, Results};
 use crate::study::statistics::compare::Bounded;
@@ -80,7 +81,9 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
         (Against::Seconds, Clock::Cpu) => "processor seconds by thread",
     };
     let x = Axis::log(x_label, [first, last].into_iter());
-    let bounds: Vec<f64> = moments().flat_map(|moment| [moment.error.low, moment.error.high]).collect();
+    let bounds: Vec<f64> = moments()
+        .flat_map(|Moment { error, .. }| if has_bands(scene) { [error.low, error.high] } else { [error.median; 2] })
+        .collect();
     let y = Axis::log("√relMSE", bounds.iter().copied());
     let mut all = vec![guide(&x, &y, moments().map(|moment| [moment.at, moment.error.median]))];
     let [bottom, top] = y.ends();
@@ -88,7 +91,9 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
         let style = styles.style(&method.method.name);
         let low = moments.iter().map(|moment| [moment.at, moment.error.low]);
         let high = moments.iter().rev().map(|moment| [moment.at, moment.error.high]);
-        all.push(series("", style, Marks::Band, low.chain(high)));
+        if has_bands(scene) {
+            all.push(series("", style, Marks::Band, low.chain(high)));
+        }
         let set_up = method.set_up.filter(|at| against == Against::Seconds && *at > x.ends()[0] && *at < x.ends()[1]);
         let short = bottom.powf(0.95) * top.powf(0.05);
         all.push(series(
@@ -112,6 +117,12 @@ pub fn errors(results: &Results, styles: &Styles, scene: &SceneSummary, against:
     let title = format!("{}: error against {noun}", scene.scene.name);
     let words = format!("{title}, both logarithmic, a line for each of {} methods", scene.methods.len());
     Some(chart(scene, what, words, SIZE, &Panel { title, x, y, series: all }))
+}
+
+/// Whether bands over runs can be told from one another.
+pub fn has_bands(scene: &SceneSummary) -> bool {
+    const MOST: usize = 8;
+    scene.methods.len() <= MOST
 }
 
 /// A line of slope −½ through the middle of what is drawn, cut at the frame.
@@ -141,7 +152,7 @@ pub fn brightness(styles: &Styles, scene: &SceneSummary) -> Option<Chart> {
         .collect();
     let furthest = rows.iter().flat_map(|(_, ends)| ends).map(|end| end.abs()).reduce(f64::max)?;
     let furthest = if furthest > 0.0 { 1.05 * furthest } else { 1.0 };
-    let x = Axis::linear("brightness error in %, ± 95 %", [-furthest, furthest]);
+    let x = Axis::linear("brightness error in %, 95 % interval", [-furthest, furthest]);
     Some(dots(
         styles,
         scene,
@@ -171,8 +182,12 @@ pub fn speed_ups(styles: &Styles, scene: &SceneSummary) -> Option<Chart> {
     if rows.is_empty() {
         return None;
     }
-    let x = Axis::log("times as fast as the baseline, 95 %", rows.iter().flat_map(|row| row.1).chain([1.0]));
-    let error = significant(scene.targets[target], 3);
+    let baseline = scene.methods.iter().find(|method| method.is_baseline).map_or("the baseline", |m| &m.method.name);
+    let x = Axis::log(
+        &format!("times as fast as {baseline}, 95 % interval"),
+        rows.iter().flat_map(|row| row.1).chain([1.0]),
+    );
+    let error = short(scene.targets[target]);
     let title = format!("{}: speed-up to √relMSE {error}", scene.scene.name);
     Some(dots(styles, scene, "speed-up", &title, x, 1.0, &rows))
 }
@@ -193,7 +208,7 @@ fn dots(
     let mut all = vec![line];
     for (i, (method, [low, middle, high])) in rows.iter().enumerate() {
         let (style, y) = (styles.style(&method.method.name), -(i as f64));
-        all.push(series("", style.without_shape(), Marks::Segments, [[*low, y], [*high, y]]));
+        all.push(series("", style.colour.into(), Marks::Segments, [[*low, y], [*high, y]]));
         all.push(series("", style, Marks::Dots, [[*middle, y]]));
     }
     let values: Vec<String> =
@@ -257,7 +272,7 @@ fn error_by(styles: &Styles, scene: &SceneSummary, number: usize, scaling: &Scal
         series(name, style, Marks::Lines, ends.map(|end| [end, error]))
     }));
     let option = scaling.varied.option();
-    let time = significant(scene.equal_time?, 3);
+    let time = short(scene.equal_time?);
     let title = format!("{}: error at {time} s by {option}", scene.scene.name);
     let y = Axis::log("√relMSE", values.into_iter());
     let what = format!("{option}-{}-error", number + 1);

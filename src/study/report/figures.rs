@@ -84,10 +84,19 @@ pub fn number(value: Option<f64>) -> String {
     value.map_or(UNKNOWN.into(), |value| significant(value, 3))
 }
 
-/// Seconds or another unit behind three digits.
-pub fn with(value: Option<f64>, unit: &str) -> String {
+/// Up to three digits, without zeros at their end: `32`, `0.12`.
+pub fn short(value: f64) -> String {
+    let digits = significant(value, 3);
+    match digits.contains('.') && !digits.contains('e') {
+        true => digits.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => digits,
+    }
+}
+
+/// The same with a unit.
+pub fn short_with(value: Option<f64>, unit: &str) -> String {
     match value {
-        Some(value) if value.is_finite() => format!("{} {unit}", significant(value, 3)),
+        Some(value) if value.is_finite() => format!("{} {unit}", short(value)),
         _ => UNKNOWN.into(),
     }
 }
@@ -96,9 +105,9 @@ pub fn with(value: Option<f64>, unit: &str) -> String {
 pub fn time(time: Option<Time>) -> String {
     match time {
         None => UNKNOWN.into(),
-        Some(Time::Before(bound)) => format!("< {} s", significant(bound, 3)),
+        Some(Time::Before(bound)) => format!("< {} s", short(bound)),
         Some(Time::At(time)) => format!("{} s", significant(time, 3)),
-        Some(Time::After(bound)) => format!("> {} s", significant(bound, 3)),
+        Some(Time::After(bound)) => format!("> {} s", short(bound)),
     }
 }
 
@@ -183,8 +192,9 @@ mod tests {
 
     #[test]
     fn numbers_are_written_with_what_is_known_of_them() {
-        assert_eq!(time(Some(Time::After(30.0))), "> 30.0 s");
+        assert_eq!(time(Some(Time::After(30.0))), "> 30 s");
         assert_eq!(time(None), "–");
+        assert_eq!([short(32.0), short(0.12), short(1200.0), short(1e-7)], ["32", "0.12", "1200", "1.00e-7"]);
         let open =
             Ratio { value: Bounded::Exactly(4.2), interval: Some([Bounded::Exactly(3.1), Bounded::AtLeast(5.0)]) };
         assert_eq!((ratio(Some(&open)).as_str(), ratio_interval(Some(&open)).as_str()), ("4.20×", "[3.10, > 5.00]"));

@@ -1,7 +1,7 @@
 //! The page: HTML that is well-formed XML as well, without anything from elsewhere.
 
 use super::charts::{self, Chart, Styles};
-use super::figures::{BEST, Cell, FLAG, Table, with};
+use super::figures::{BEST, Cell, FLAG, Table, short_with};
 use super::pictures::{Picture, colour_strip, pictures};
 use super::tables;
 use crate::render::progress::significant;
@@ -130,7 +130,7 @@ fn warning_list(warnings: &[&String]) -> String {
         return String::new();
     }
     let items: String = warnings.iter().map(|warning| format!("<li>{}</li>\n", escaped(warning))).collect();
-    format!("<aside class=\"warnings\">\n<h2>Mind</h2>\n<ul>\n{items}</ul>\n</aside>\n")
+    format!("<aside class=\"warnings\">\n<h2>Warnings</h2>\n<ul>\n{items}</ul>\n</aside>\n")
 }
 
 fn summary_section(styles: &Styles, summaries: &[SceneSummary]) -> String {
@@ -154,7 +154,10 @@ fn scene_section(
     pictures: &[Picture],
 ) -> String {
     let runs = scene.methods.iter().map(|method| method.method.runs.len()).max().unwrap_or(0);
-    let caption = format!("Median over seeds; band: {}.", Spread::ends(runs));
+    let caption = match charts::has_bands(scene) {
+        true => format!("Median over seeds; band: {}.", Spread::ends(runs)),
+        false => "Median over seeds; bands would hide one another, and are in the table of errors.".into(),
+    };
     let curves: String = curves(results, styles, scene)
         .iter()
         .zip([format!("{caption} Short lines at the bottom: set-up is over."), caption.clone()])
@@ -178,14 +181,27 @@ fn scene_section(
     };
     format!(
         "<section id=\"scene-{number}\" class=\"scene\">\n<h2>{}</h2>\n<p class=\"note\"><code>{}</code>, {} × {} \
-         pixels</p>\n{}<div class=\"charts\">\n{curves}</div>\n{}{scaling}</section>\n",
+         pixels. {}</p>\n{}<div class=\"charts\">\n{curves}</div>\n{}{scaling}</section>\n",
         escaped(&scene.scene.name),
         escaped(&scene.scene.scene),
         scene.scene.size[0],
         scene.scene.size[1],
+        escaped(&reference_noise(scene)),
         viewer(number, scene, pictures),
         all.concat(),
     )
+}
+
+/// What the reference can tell.
+fn reference_noise(scene: &SceneSummary) -> String {
+    let mut runs = scene.methods.iter().flat_map(|method| &method.method.runs);
+    match runs.next().map(|run| run.end().errors.reference_rel_mse) {
+        Some(noise) if noise > 0.0 => {
+            format!("The reference's own noise, √relMSE {}, is subtracted.", significant(noise.sqrt(), 2))
+        }
+        Some(_) => "The reference's own noise is not known, and not subtracted.".into(),
+        None => String::new(),
+    }
 }
 
 fn figure(chart: &Chart, caption: &str) -> String {
@@ -235,10 +251,10 @@ fn viewer(number: usize, scene: &SceneSummary, pictures: &[Picture]) -> String {
     }
     let [width, height] = scene.scene.size;
     let thumbnails: String = pictures.iter().map(|picture| thumbnail(picture, [width, height])).collect();
-    let time = with(scene.equal_time, "s");
+    let time = short_with(scene.equal_time, "s");
     format!(
         "<h3>Images at equal time</h3>\n<p>Each method's first seed at its snapshot closest to {time}, the latest time \
-         that all runs reach; the actual time stands below. Exposure 1 for all: linear 1 is white.</p>\n\
+         that all runs reach; its own time stands below it. Exposure 1 for all: linear 1 is white.</p>\n\
          <div class=\"images\" data-width=\"{width}\" data-height=\"{height}\">\n\
          <div class=\"viewer\" hidden=\"hidden\">\n<div class=\"controls\">\n\
          <label>Left <select class=\"left\"></select></label>\n\
@@ -257,10 +273,10 @@ fn viewer(number: usize, scene: &SceneSummary, pictures: &[Picture]) -> String {
 }
 
 fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
-    let image = |name: &str, data: &str| {
+    let image = |class: &str, name: &str, data: &str| {
         let name = escaped(name);
         format!(
-            "<div class=\"frame\"><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{name}\" \
+            "<div class=\"{class}\"><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{name}\" \
              data-name=\"{name}\"/></div>\n"
         )
     };
@@ -269,15 +285,19 @@ fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
         Some(source) => {
             let error = error(&source.snapshot.errors).map_or("–".into(), |error| significant(error, 3));
             let name = source.method.name.clone();
-            let facts =
-                format!("{}, √relMSE {error}, seed {}", with(Some(source.snapshot.seconds), "s"), source.run.seed);
-            let errors = picture.errors.as_ref().map(|errors| image(&format!("errors of {name}"), errors));
+            let facts = format!(
+                "{}, √relMSE {error}, seed {}",
+                short_with(Some(source.snapshot.seconds), "s"),
+                source.run.seed
+            );
+            let errors =
+                picture.errors.as_ref().map(|errors| image("frame errors", &format!("errors of {name}"), errors));
             (name, facts, errors.unwrap_or_default())
         }
     };
     format!(
         "<figure>\n{}{second}<figcaption><b>{}</b> {}</figcaption>\n</figure>\n",
-        image(&name, &picture.image),
+        image("frame", &name, &picture.image),
         escaped(&name),
         escaped(&facts)
     )
@@ -285,7 +305,7 @@ fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
 
 /// What the colours of error maps mean.
 fn scale() -> String {
-    let labels = ["−100 %", "−25 %", "0", "+25 %", "+100 %"].map(|label| format!("<span>{label}</span>"));
+    let labels = ["−100", "−25", "0", "+25", "+100 %"].map(|label| format!("<span>{label}</span>"));
     format!(
         "<div class=\"scale\">\n<p>Errors: (x − r)/√(r² + 0.01) of luminances</p>\n<img src=\"{}\" width=\"201\" \
          height=\"1\" alt=\"colours of errors\"/>\n<p class=\"ticks\">{}</p>\n<p class=\"ends\"><span>too dark</span>\
@@ -320,8 +340,8 @@ fn method_section(results: &Results) -> String {
     }
     format!(
         "<section id=\"methods\">\n<h2>Methods</h2>\n<div class=\"table\">\n<table>\n<thead><tr><th \
-         scope=\"col\">method</th><th scope=\"col\">options</th><th scope=\"col\">a command that repeats its first \
-         run</th></tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n</div>\n{}</section>\n",
+         scope=\"col\">method</th><th class=\"words\" scope=\"col\">options</th><th class=\"words\" scope=\"col\">a \
+         command that repeats its first run</th></tr></thead>\n<tbody>\n{rows}</tbody>\n</table>\n</div>\n{}</section>\n",
         run_warnings(results)
     )
 }
@@ -380,7 +400,8 @@ fn explanation_section(results: &Results, summaries: &[SceneSummary]) -> String 
         (
             "Speed-up",
             "Median time of the baseline over that of the method. Intervals are the middle 95 % of 1000 bootstrap \
-             resamples of the runs of both; with few runs they are coarse. An end that no resample has seen is open: >."
+             resamples of the runs of both; with few runs they are coarse. > and < stand where the error was not reached, or before the first \
+             snapshot."
                 .into(),
         ),
         (
@@ -406,8 +427,8 @@ fn explanation_section(results: &Results, summaries: &[SceneSummary]) -> String 
         ),
         (
             "Efficiency",
-            "1/(relMSE · seconds) at the end, median over runs. It takes no account of the time at which it was \
-             reached, if errors fall as they should."
+            "1/(relMSE · seconds) at the end, median over runs. If errors fall as 1/√time, it is the same \
+             whenever runs end."
                 .into(),
         ),
         (
@@ -426,7 +447,9 @@ fn origin_section(results: &Results) -> String {
     let list = |items: &[String]| items.iter().map(|item| escaped(item)).collect::<Vec<_>>().join("<br/>");
     format!(
         "<section id=\"origin\">\n<h2>Origin</h2>\n<dl class=\"terms\">\n<dt>Command</dt>\n<dd><code>{}</code></dd>\n\
-         <dt>Programs</dt>\n<dd>{}</dd>\n<dt>Machines</dt>\n<dd>{}</dd>\n</dl>\n<details>\n<summary>Study file\
+         <dt>Programs</dt>\n<dd>{}</dd>\n<dt>Machines</dt>\n<dd>{}</dd>\n<dt>Data</dt>\n\
+         <dd><code>results.csv</code> beside this page has a line for each snapshot of each run, <code>plots</code> the \
+         charts as SVG.</dd>\n</dl>\n<details>\n<summary>Study file\
          </summary>\n<pre>{}</pre>\n</details>\n</section>\n",
         escaped(&results.command),
         list(&results.programs),

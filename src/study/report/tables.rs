@@ -1,12 +1,13 @@
 //! The tables of a report.
 
 use super::figures::{
-    Cell, Table, UNKNOWN, brightness, count, mark_best, number, percent, ratio, ratio_interval, slope, time, with,
+    Cell, Table, UNKNOWN, brightness, count, mark_best, number, percent, ratio, ratio_interval, short, short_with,
+    slope, time,
 };
 use crate::render::progress::significant;
 use crate::study::results::Stage;
-use crate::study::statistics::scaling::{Scaling, Varied};
-use crate::study::statistics::{MethodSummary, SceneSummary};
+use crate::study::statistics::scaling::{Ladder, Scaling, Varied};
+use crate::study::statistics::{Brightness, MethodSummary, SceneSummary, Spread};
 
 /// Why a brightness is flagged.
 pub const BIASED: &str = "the interval excludes 0: images are too dark or too bright, or this is the one of twenty \
@@ -25,8 +26,7 @@ pub fn summary(scene: &SceneSummary) -> Table {
         let [slope_mean, slope_half] = slope(method.slope);
         vec![
             name(method),
-            Cell::from(number(method.end_error.map(|error| error.median)))
-                .with(largest(method.between_seeds.largest, "×")),
+            Cell::from(number(method.end_error.map(|error| error.median))).with(largest(method.between_seeds.largest)),
             match method.is_baseline && faster.is_some() {
                 true => "1".into(),
                 false => Cell::from(ratio(faster.as_ref())).with(ratio_interval(faster.as_ref())),
@@ -45,10 +45,10 @@ pub fn summary(scene: &SceneSummary) -> Table {
     let mut rows: Vec<Vec<Cell>> = rows.collect();
     let of = |value: &dyn Fn(&MethodSummary) -> Option<f64>| scene.methods.iter().map(value).collect::<Vec<_>>();
     mark_best(&mut rows, 1, &of(&|method| method.end_error.map(|error| error.median)), false);
-    mark_best(&mut rows, 2, &of(&|method| speed_up(method).map(|ratio| ratio.value.value())), true);
-    mark_best(&mut rows, 5, &of(&|method| method.efficiency_ratio.map(|ratio| ratio.value.value())), true);
+    mark_best(&mut rows, 2, &of(&|method| speed_up(method)?.value.at_least()), true);
+    mark_best(&mut rows, 5, &of(&|method| method.efficiency_ratio?.value.at_least()), true);
     let [width, height] = scene.scene.size;
-    let goal = target.map_or(String::new(), |(_, error)| format!(", speed-up to √relMSE {}", significant(error, 3)));
+    let goal = target.map_or(String::new(), |(_, error)| format!(", speed-up to √relMSE {}", short(error)));
     Table {
         caption: format!("{} ({width} × {height}){goal}", scene.scene.name),
         head: ["method", "√relMSE", "speed-up", "brightness error", "slope", "efficiency", "M mut./s"]
@@ -67,8 +67,8 @@ fn name(method: &MethodSummary) -> Cell {
     Cell::from(&method.method.name[..]).with(runs)
 }
 
-fn largest(quotient: Option<f64>, unit: &str) -> String {
-    quotient.map_or(String::new(), |quotient| format!("(≤ {quotient:.2}{unit})"))
+fn largest(quotient: Option<f64>) -> String {
+    quotient.map_or(String::new(), |quotient| format!("(≤ {quotient:.2}×)"))
 }
 
 /// When errors are reached.
@@ -88,11 +88,10 @@ pub fn times(scene: &SceneSummary) -> Table {
         });
         [name(method)].into_iter().chain(cells).collect()
     });
-    let targets = scene.targets.iter().map(|target| format!("to {}", significant(*target, 3)));
+    let targets = scene.targets.iter().map(|target| format!("to {}", short(*target)));
     let mut rows: Vec<Vec<Cell>> = rows.collect();
     for i in 0..scene.targets.len() {
-        let values: Vec<_> =
-            scene.methods.iter().map(|method| method.speed_ups[i].map(|ratio| ratio.value.value())).collect();
+        let values: Vec<_> = scene.methods.iter().map(|method| method.speed_ups[i]?.value.at_least()).collect();
         mark_best(&mut rows, i + 1, &values, true);
     }
     Table {
@@ -105,7 +104,7 @@ pub fn times(scene: &SceneSummary) -> Table {
 /// Errors at equal time and at equal numbers of mutations, and how runs differ.
 pub fn errors(scene: &SceneSummary) -> Table {
     let rows = scene.methods.iter().map(|method| {
-        let spread = |spread: Option<crate::study::statistics::Spread>| match spread {
+        let spread = |spread: Option<Spread>| match spread {
             Some(spread) => Cell::from(number(Some(spread.median))).with(format!(
                 "[{}, {}]",
                 significant(spread.low, 3),
@@ -137,7 +136,7 @@ pub fn errors(scene: &SceneSummary) -> Table {
         caption: "Error (√relMSE) and how runs differ".into(),
         head: vec![
             "method".into(),
-            format!("at {}", with(scene.equal_time, "s")),
+            format!("at {}", short_with(scene.equal_time, "s")),
             format!("at {} mutations", count(scene.equal_mutations)),
             "at the end".into(),
             "deviation".into(),
@@ -152,9 +151,7 @@ pub fn errors(scene: &SceneSummary) -> Table {
 pub fn brightnesses(scene: &SceneSummary) -> Table {
     let rows = scene.methods.iter().map(|method| {
         let [bias, half] = brightness(method.brightness.as_ref());
-        let of = |value: fn(&crate::study::statistics::Brightness) -> Option<f64>| {
-            percent(method.brightness.as_ref().and_then(value))
-        };
+        let of = |value: fn(&Brightness) -> Option<f64>| percent(method.brightness.as_ref().and_then(value));
         vec![
             name(method),
             Cell::from(bias)
@@ -166,8 +163,8 @@ pub fn brightnesses(scene: &SceneSummary) -> Table {
         ]
     });
     Table {
-        caption: "Brightness against the reference, at the end".into(),
-        head: ["method", "error", "deviation", "stated by runs", "reference's own"].map(Into::into).into(),
+        caption: "Brightness at the end; what runs state; the reference's own error".into(),
+        head: ["method", "error", "deviation", "stated", "reference"].map(Into::into).into(),
         rows: rows.collect(),
     }
 }
@@ -186,7 +183,10 @@ pub fn work(scene: &SceneSummary) -> Table {
                     .with(ratio_interval(method.efficiency_ratio.as_ref())),
             },
         ];
-        let stages = method.stages.iter().map(|seconds| with(*seconds, "s").into());
+        let stages = method.stages.iter().map(|seconds| match seconds {
+            Some(seconds) => format!("{} s", significant(*seconds, 2)).into(),
+            None => UNKNOWN.into(),
+        });
         ahead.into_iter().chain(stages).collect()
     });
     let mut rows: Vec<Vec<Cell>> = rows.collect();
@@ -246,7 +246,7 @@ pub fn scaling(scene: &SceneSummary, scaling: &Scaling) -> Table {
             number(row.efficiency).into(),
         ]);
         if laddered {
-            let of = |value: fn(&crate::study::statistics::scaling::Ladder) -> f64| row.ladder.as_ref().map(value);
+            let of = |value: fn(&Ladder) -> f64| row.ladder.as_ref().map(value);
             cells.extend([
                 number(of(|ladder| ladder.swap_rate)).into(),
                 Cell::from(number(of(|ladder| ladder.round_trips)))
@@ -264,10 +264,14 @@ pub fn scaling(scene: &SceneSummary, scaling: &Scaling) -> Table {
     let errors: Vec<_> = scaling.rows.iter().map(|row| row.equal_time_error.map(|error| error.median)).collect();
     mark_best(&mut rows, if threads { 4 } else { 3 }, &errors, false);
     let mut head = vec![scaling.varied.option().to_owned(), "M mut./s".into(), "speed-up".into()];
-    head.extend(threads.then(|| "parallel efficiency".into()));
-    head.extend([format!("√relMSE at {}", with(scene.equal_time, "s")), "at the end".into(), "efficiency".into()]);
+    head.extend(threads.then(|| "parallel eff.".into()));
+    head.extend([
+        format!("√relMSE at {}", short_with(scene.equal_time, "s")),
+        "at the end".into(),
+        "efficiency".into(),
+    ]);
     if laddered {
-        let names = ["swaps accepted", "round trips", "by ladder", "restarts", "barrier Λ", "uniform"];
+        let names = ["swaps", "round trips", "by ladder", "restarts", "Λ", "uniform"];
         head.extend(names.map(String::from));
     }
     Table { caption: format!("{}, by {}: {}", scene.scene.name, scaling.varied.option(), scaling.shared), head, rows }

@@ -35,7 +35,7 @@ for (const group of document.querySelectorAll(".images")) {
   const [right, left] = sides;
   const line = element("line", stage);
   stage.style.aspectRatio = width + " / " + height;
-  // A stage is at most as high as the window, and pixels of small images are whole numbers of the screen's.
+  // A stage is not higher than the window.
   stage.style.maxWidth = "min(100%, " + 85 * width / height + "vh)";
 
   const draw = () => {
@@ -111,7 +111,7 @@ for (const group of document.querySelectorAll(".images")) {
   });
 
   // Reference against the last method's image, which is seldom the baseline; then all of it.
-  const images = thumbnails.map((thumbnail, i) => i).filter((i) => !thumbnails[i].dataset.name.startsWith("errors of "));
+  const images = thumbnails.map((thumbnail, i) => i).filter((i) => !thumbnails[i].closest(".errors"));
   left.choice.value = 0;
   right.choice.value = images[images.length - 1];
   for (const side of sides) side.show();

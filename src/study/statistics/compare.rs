@@ -33,6 +33,14 @@ impl Bounded {
         }
     }
 
+    /// What it is not less than, if that is known.
+    pub fn at_least(self) -> Option<f64> {
+        match self {
+            Bounded::AtMost(_) => None,
+            Bounded::Exactly(value) | Bounded::AtLeast(value) => Some(value),
+        }
+    }
+
     /// For orders: bounds are beyond all numbers.
     fn key(self) -> f64 {
         match self {
@@ -231,6 +239,8 @@ mod tests {
         assert_eq!(speed_up(&all(After(30.0)), &all(After(30.0))), None);
         assert_eq!(speed_up(&all(Before(1.0)), &all(Before(1.0))), None);
         assert_eq!(speed_up(&[At(1.0)], &all(At(1.0))).unwrap().interval, None, "one run tells no spread");
+        let bounds = [Bounded::AtMost(2.0), Bounded::Exactly(2.0), Bounded::AtLeast(2.0)].map(Bounded::at_least);
+        assert_eq!(bounds, [None, Some(2.0), Some(2.0)]);
         // Two of five never reach it: some resamples have medians that are bounds, and the interval is open above.
         let open = [After(30.0), After(30.0), At(10.0), At(11.0), At(12.0)];
         let ratio = speed_up(&open, &all(At(5.0))).unwrap();

@@ -147,7 +147,8 @@ pub fn resampled<T: Clone, S>(sets: [&[T]; 2], statistic: impl Fn([&[T]; 2]) -> 
                 Counter { ladder: i as u32, replica: set as u16, step: resample as u64, purpose: Purpose::Bootstrap };
             rng.words(counter, 0)[0]
         };
-        (0..from.len()).map(|i| from[(u64::from(word(i)) * from.len() as u64 >> 32) as usize].clone()).collect()
+        let place = |i: usize| ((u64::from(word(i)) * from.len() as u64) >> 32) as usize; // Lemire 2019, bias < n/2³²
+        (0..from.len()).map(|i| from[place(i)].clone()).collect()
     };
     (0..RESAMPLES).map(|resample| statistic([&draw(resample, 0), &draw(resample, 1)])).collect()
 }

@@ -111,8 +111,11 @@ pub fn scalings(scene: &SceneResults, equal_time: Option<f64>) -> Vec<Scaling> {
     Varied::ALL.into_iter().flat_map(|varied| groups(scene, varied, equal_time)).collect()
 }
 
+/// Options that methods of a group share, and what else was varied.
+type Shared = (String, Vec<(String, String)>);
+
 fn groups(scene: &SceneResults, varied: Varied, equal_time: Option<f64>) -> Vec<Scaling> {
-    let mut groups: Vec<((String, Vec<(String, String)>), Vec<(usize, &MethodResults)>)> = Vec::new();
+    let mut groups: Vec<(Shared, Vec<(usize, &MethodResults)>)> = Vec::new();
     for method in &scene.methods {
         let Some(number) = varied.of(method) else { continue };
         let others = method.variant.iter().filter(|(option, _)| option != varied.option()).cloned().collect();
