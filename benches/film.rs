@@ -9,6 +9,8 @@ use relt::film::{Accumulator, Filter, Footprint, Heuristic, Image, Splat, Splats
 /// Time before and while a benchmark is measured: enough for nanoseconds.
 const WARM_UP: Duration = Duration::from_millis(200);
 const MEASUREMENT: Duration = Duration::from_millis(800);
+/// Few enough for plots to be drawn in a moment (`benches/support`).
+const RESAMPLES: usize = 10_000;
 
 /// Splats a worker brings at a time.
 const BATCH: usize = 4096;
@@ -18,7 +20,7 @@ const BATCHES: usize = 64;
 
 fn deposit(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/deposit");
-    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES);
     group.throughput(Throughput::Elements(BATCH as u64));
     for size in [256, 1024] {
         let film = Accumulator::new(size, size, 1, 20.0);
@@ -44,7 +46,7 @@ fn deposit(c: &mut Criterion) {
 
 fn spread(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/spread");
-    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES);
     group.throughput(Throughput::Elements(1));
     for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }] {
         let footprint = Footprint::new(filter, 256, 256);
@@ -63,7 +65,7 @@ fn spread(c: &mut Criterion) {
 /// The paper's heuristics on images of 512 × 512 pixels; throughput in pixels.
 fn combine(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/combine");
-    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).sample_size(10);
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES).sample_size(10);
     const SIZE: u32 = 512;
     group.throughput(Throughput::Elements(u64::from(SIZE * SIZE)));
     let [uniform, target] = [1, 2].map(|image: u32| {

@@ -1,8 +1,10 @@
-//! What ladders cost beside their target: a swap phase against the number of replicas and threads, and mutations per
-//! second against the number of replicas at an equal number of chains.
+//! What ladders cost beside their target, which costs next to nothing here, so that everything else shows.
 //!
-//! The target costs next to nothing, so that everything else shows. `swap/THREADS/K` is one swap phase of all ladders,
-//! told in ladders a second; `mutations/K` whole sweeps on one thread, told in evaluations a second.
+//! - `ladders/free/re/K` is whole sweeps of replica exchange on ladders of K rungs, on one thread and with about the same
+//!   number of chains for all K; `ladders/free/mlt` as many chains of the baseline: what is between them is offers, swaps,
+//!   weights of the combination, histograms and records. In mutations a second.
+//! - `stages/ladders/swap/THREADS/K` is the swap phase of a sweep, told in the mutations of that sweep a second. States
+//!   have gathered nothing between phases, so recording them is not part of it.
 
 use std::time::Duration;
 
@@ -11,8 +13,8 @@ use criterion::{
 };
 use rayon::prelude::*;
 use relt::{
-    chain::{Start, Target, resample},
-    film::{Accumulator, Filter, Footprint},
+    chain::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Recorder, Start, Target, resample},
+    film::{Accumulator, Filter, Footprint, Splats},
     path::{Contribution, Contributions},
     rng::{Counter, Purpose, Rng, unit_f32},
     sample::Proposals,
@@ -23,6 +25,8 @@ use relt::{
 /// Time that criterion runs each benchmark for before it measures, and while.
 const WARM_UP: Duration = Duration::from_millis(200);
 const MEASUREMENT: Duration = Duration::from_millis(800);
+/// Few enough for plots to be drawn in a moment (`benches/support`).
+const RESAMPLES: usize = 10_000;
 /// Chains of a block, on ladders of any length.
 const CHAINS: usize = 192;
 /// Blocks that threads share.
@@ -71,7 +75,7 @@ impl Ladders {
             half: u64::MAX,
             ladder,
         };
-        let ladders = (CHAINS / (rungs - 1)).max(1);
+        let ladders = ladders_a_block(rungs);
         let mut all = Ladders {
             footprint: Footprint::new(Filter::Box, FILM, FILM),
             film: Accumulator::new(FILM, FILM, layers.count, 4.0),
@@ -110,35 +114,70 @@ fn samples() -> Vec<Start> {
     (0..256).map(|step| Start { counter: counter(step), ln_g: ln_g(counter(step)) }).collect()
 }
 
+fn all(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("stages/ladders");
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES);
+    for threads in [1, 2] {
+        for rungs in [4, 8, 16, 32, 256] {
+            swap(&mut group, rungs, threads);
+        }
+    }
+    group.finish();
+    let mut group = criterion.benchmark_group("ladders/free");
+    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES);
+    baseline(&mut group);
+    for rungs in [2, 4, 8, 16, 32, 64] {
+        replica_exchange(&mut group, rungs);
+    }
+    group.finish();
+}
+
+/// Ladders of so many rungs in a block.
+fn ladders_a_block(rungs: usize) -> usize {
+    (CHAINS / (rungs - 1)).max(1)
+}
+
+/// Mutations of a sweep of a block: every chain moves, and every ladder is offered a point.
+fn a_sweep(rungs: usize) -> u64 {
+    (ladders_a_block(rungs) * rungs) as u64
+}
+
 fn swap(group: &mut BenchmarkGroup<WallTime>, rungs: usize, threads: usize) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-    let mut ladders = pool.install(|| Ladders::new(rungs, BLOCKS));
-    group.throughput(Throughput::Elements((BLOCKS * (CHAINS / (rungs - 1)).max(1)) as u64));
+    let mut prepared = None;
+    group.throughput(Throughput::Elements(BLOCKS as u64 * a_sweep(rungs)));
     group.bench_function(BenchmarkId::new(format!("swap/{threads}"), rungs), |bencher| {
+        let (pool, ladders) = prepared.get_or_insert_with(|| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let ladders = pool.install(|| Ladders::new(rungs, BLOCKS));
+            (pool, ladders)
+        });
         bencher.iter(|| pool.install(|| ladders.work(|block, canvas, round| block.swap(canvas, round))));
     });
 }
 
-fn mutations(group: &mut BenchmarkGroup<WallTime>, rungs: usize) {
-    let mut ladders = Ladders::new(rungs, 1);
-    group.throughput(Throughput::Elements(ladders.blocks[0].lanes() as u64));
-    group.bench_function(BenchmarkId::new("mutations", rungs), |bencher| {
+fn replica_exchange(group: &mut BenchmarkGroup<WallTime>, rungs: usize) {
+    let mut prepared = None;
+    group.throughput(Throughput::Elements(a_sweep(rungs)));
+    group.bench_function(BenchmarkId::new("re", rungs), |bencher| {
+        let ladders = prepared.get_or_insert_with(|| Ladders::new(rungs, 1));
         bencher.iter(|| ladders.work(|block, canvas, round| block.advance(&Free, 1, canvas, round)));
     });
 }
 
-fn all(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("ladders");
-    group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT);
-    for threads in [1, 2] {
-        for rungs in [4, 16, 64, 256] {
-            swap(&mut group, rungs, threads);
-        }
-    }
-    for rungs in [2, 4, 8, 16, 32, 64] {
-        mutations(&mut group, rungs);
-    }
-    group.finish();
+fn baseline(group: &mut BenchmarkGroup<WallTime>) {
+    let large_steps = LargeSteps { probability: LARGE_STEP_PROBABILITY, kelemen_weights: false };
+    let starts = resample(&samples(), 1.0, CHAINS, Rng::new(0), 0);
+    let mut chains = Baseline::new(&Free, Rng::new(0), 0, &starts, large_steps);
+    let (footprint, film) = (Footprint::new(Filter::Box, FILM, FILM), Accumulator::new(FILM, FILM, 1, 4.0));
+    let mut splats = Splats::new(1);
+    group.throughput(Throughput::Elements(CHAINS as u64));
+    group.bench_function("mlt", |bencher| {
+        bencher.iter(|| {
+            let mut recorder = Recorder { footprint: &footprint, size: [FILM as f32; 2], splats: &mut splats };
+            chains.advance(&Free, 1, 1.0, &mut recorder);
+            film.deposit(&mut splats);
+        });
+    });
 }
 
 criterion_group!(benches, all);

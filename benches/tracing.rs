@@ -1,4 +1,5 @@
-//! Bare Embree tracing: rays a second for each kind of ray and packet width, on one thread.
+//! Bare Embree tracing: rays a second for each kind of ray and packet width, on one thread. What widths make of whole
+//! mutations is in `mutations.rs`.
 //!
 //! The rays are those of uniform points of the cube, as a path tracer's. `quadrics` is the Cornell box with 40 spheres
 //! and disks in it.
@@ -27,13 +28,13 @@ fn tracing(criterion: &mut Criterion) {
         let rays = record_rays(&scene, BATCHES);
         let mut hits = Hits::default();
         for (kind, batches) in [("camera", &rays.camera), ("bounce", &rays.bounce)] {
-            all_widths(criterion, &format!("tracing/{name}/{kind}"), batches, |width, rays| {
+            all_widths(criterion, &format!("tracing/packets/{name}/{kind}"), batches, |width, rays| {
                 scene.tracer.closest(width, rays, &mut hits);
                 black_box(&hits);
             });
         }
         let mut occluded = Vec::new();
-        all_widths(criterion, &format!("tracing/{name}/shadow"), &rays.shadow, |width, rays| {
+        all_widths(criterion, &format!("tracing/packets/{name}/shadow"), &rays.shadow, |width, rays| {
             scene.tracer.occluded(width, rays, &mut occluded);
             black_box(&occluded);
         });
@@ -44,7 +45,11 @@ fn all_widths(criterion: &mut Criterion, name: &str, batches: &[Rays], mut trace
     let rays: usize = batches.iter().map(Rays::len).sum();
     let mut group = criterion.benchmark_group(name);
     group.sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(rays as u64));
-    group.sample_size(20).warm_up_time(support::WARM_UP).measurement_time(support::MEASUREMENT);
+    group
+        .sample_size(20)
+        .nresamples(support::RESAMPLES)
+        .warm_up_time(support::WARM_UP)
+        .measurement_time(support::MEASUREMENT);
     for width in Width::ALL {
         group.bench_function(BenchmarkId::from_parameter(width), |bencher| {
             bencher.iter(|| batches.iter().for_each(|rays| trace(width, rays)));

@@ -53,9 +53,12 @@ pub struct Workspace {
     occluded: Vec<bool>,
     /// Rays of every kind as they are traced, where somebody asked for them.
     recording: Option<RecordedRays>,
+    /// Answers that take the place of tracing, where somebody gave them.
+    replay: Option<Replay>,
 }
 
-/// The rays of some evaluations, batch by batch, for measuring Embree alone.
+/// The rays of some evaluations, batch by batch, for measuring Embree alone, and what came of them, for measuring all
+/// but Embree.
 #[derive(Default)]
 pub struct RecordedRays {
     /// Camera rays.
@@ -64,6 +67,17 @@ pub struct RecordedRays {
     pub bounce: Vec<Rays>,
     /// Shadow rays.
     pub shadow: Vec<Rays>,
+    /// Hits of camera rays and of those after a bounce, in the order in which they were traced.
+    pub hits: Vec<Hits>,
+    /// Whether something was in the way of shadow rays, in that order.
+    pub occluded: Vec<Vec<bool>>,
+}
+
+/// Recorded answers, given again in the order in which they were recorded, round and round.
+struct Replay {
+    recorded: RecordedRays,
+    next_hits: usize,
+    next_occluded: usize,
 }
 
 impl Workspace {
@@ -72,9 +86,35 @@ impl Workspace {
         Workspace { recording: Some(RecordedRays::default()), ..Workspace::default() }
     }
 
+    /// A workspace that never asks Embree, but takes the answers recorded in evaluations of some points for those of the
+    /// same points in the same batches, as often as those are gone through.
+    pub fn replaying(recorded: RecordedRays) -> Workspace {
+        Workspace { replay: Some(Replay { recorded, next_hits: 0, next_occluded: 0 }), ..Workspace::default() }
+    }
+
     /// The rays kept since the last call.
     pub fn take_recorded(&mut self) -> RecordedRays {
         self.recording.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+}
+
+impl Replay {
+    fn closest(&mut self, rays: &Rays, hits: &mut Hits) {
+        let answers = &self.recorded.hits[self.next_hits];
+        debug_assert_eq!(rays.len(), answers.t.len(), "other points than those recorded");
+        hits.geometry.clone_from(&answers.geometry);
+        hits.primitive.clone_from(&answers.primitive);
+        hits.u.clone_from(&answers.u);
+        hits.v.clone_from(&answers.v);
+        hits.t.clone_from(&answers.t);
+        self.next_hits = (self.next_hits + 1) % self.recorded.hits.len();
+    }
+
+    fn occluded(&mut self, rays: &Rays, occluded: &mut Vec<bool>) {
+        let answers = &self.recorded.occluded[self.next_occluded];
+        debug_assert_eq!(rays.len(), answers.len(), "other points than those recorded");
+        occluded.clone_from(answers);
+        self.next_occluded = (self.next_occluded + 1) % self.recorded.occluded.len();
     }
 }
 
@@ -160,10 +200,14 @@ fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Workspa
 /// Finds the closest hits of all live rays.
 fn trace(mapping: &Mapping, bounce: u16, w: &mut Workspace, out: &mut Contributions) {
     let width = if bounce == 0 { mapping.widths.camera } else { mapping.widths.bounce };
-    mapping.scene.tracer.closest(width, &w.rays, &mut w.hits);
+    match &mut w.replay {
+        None => mapping.scene.tracer.closest(width, &w.rays, &mut w.hits),
+        Some(replay) => replay.closest(&w.rays, &mut w.hits),
+    }
     out.rays += w.rays.len() as u64;
     if let Some(recording) = &mut w.recording {
         (if bounce == 0 { &mut recording.camera } else { &mut recording.bounce }).push(w.rays.clone());
+        recording.hits.push(w.hits.clone());
     }
 }
 
@@ -220,10 +264,14 @@ fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &
 
 /// Traces the shadow rays and adds the lights that are seen.
 fn connect(mapping: &Mapping, w: &mut Workspace, out: &mut Contributions) {
-    mapping.scene.tracer.occluded(mapping.widths.shadow, &w.shadow_rays, &mut w.occluded);
+    match &mut w.replay {
+        None => mapping.scene.tracer.occluded(mapping.widths.shadow, &w.shadow_rays, &mut w.occluded),
+        Some(replay) => replay.occluded(&w.shadow_rays, &mut w.occluded),
+    }
     out.rays += w.shadow_rays.len() as u64;
     if let Some(recording) = &mut w.recording {
         recording.shadow.push(w.shadow_rays.clone());
+        recording.occluded.push(w.occluded.clone());
     }
     for ((&lane, &contribution), &occluded) in w.shadow_lanes.iter().zip(&w.shadow_contributions).zip(&w.occluded) {
         if !occluded {

@@ -130,3 +130,25 @@ fn the_small_kernel_is_chosen_where_it_is_enough() {
     let kernels = OWN.map(|name| own(name, &[]).features.kernel());
     assert_eq!(kernels, [Kernel::Diffuse, Kernel::Full, Kernel::Diffuse], "{OWN:?}");
 }
+
+#[test]
+fn replayed_hits_give_what_they_were_recorded_from() {
+    for name in OWN {
+        let scene = own(name, &[("res", "64")]);
+        let mapping = Mapping::new(&scene, fixed_widths(Width::W8));
+        let evaluate = |evaluator: &mut Evaluator<Workspace>, step| {
+            evaluator.moves.fill(Move::Fresh);
+            evaluator.counters = counters(step);
+            evaluator.evaluate(&mapping, &Points::new(0));
+            evaluator.out.lanes.iter().map(bits).collect::<Vec<_>>()
+        };
+        let mut recording = Evaluator::with_workspace(Rng::new(7), counters(0), Workspace::recording());
+        let traced = [0, 1, 2].map(|step| evaluate(&mut recording, step));
+        let replay = Workspace::replaying(recording.workspace().take_recorded());
+        let mut replaying = Evaluator::with_workspace(Rng::new(7), counters(0), replay);
+        for round in 0..2 {
+            let replayed = [0, 1, 2].map(|step| evaluate(&mut replaying, step));
+            assert!(replayed == traced, "{name}, round {round}");
+        }
+    }
+}
