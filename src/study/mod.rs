@@ -6,6 +6,7 @@ pub mod ladder_page;
 pub mod ladder_text;
 pub mod metrics;
 pub mod reference;
+pub mod reference_progress;
 pub mod results;
 pub mod run_log;
 mod svg;
