@@ -130,7 +130,7 @@ impl Run {
             rng: Rng::new(self.settings.seed),
         };
         if is_smoke_test() {
-            return bencher.iter(|| render::engine(&stage, &self.settings, Some(SMOKE)).advance(&stage, u64::MAX));
+            return bencher.iter(|| work(render::engine(&stage, &self.settings, Some(SMOKE)).as_mut(), &stage, SMOKE));
         }
         if self.engine.is_none() {
             self.engine = Some(self.begin(&stage, scene));

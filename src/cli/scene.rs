@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::values;
 use crate::embree::Device;
 use crate::load;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneDescription};
 
 /// A scene file and values for its parameters.
 #[derive(Args)]
@@ -42,7 +42,18 @@ impl SceneArguments {
 
     /// Reads the file and builds the scene.
     pub fn open(&self) -> Result<Opened, Failure> {
-        let description = load::scene(&self.path, &self.defines).map_err(Failure::shown)?;
+        Opened::of(self.describe()?)
+    }
+
+    /// Reads the file.
+    pub fn describe(&self) -> Result<SceneDescription, Failure> {
+        load::scene(&self.path, &self.defines).map_err(Failure::shown)
+    }
+}
+
+impl Opened {
+    /// Builds a scene.
+    pub fn of(description: SceneDescription) -> Result<Opened, Failure> {
         let device = Device::new("").map_err(Failure::input)?;
         let warnings = description.warnings.clone();
         let scene = Scene::new(&device, description).map_err(Failure::running)?;

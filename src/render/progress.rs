@@ -319,7 +319,7 @@ pub fn with_unit(value: f64) -> String {
 }
 
 /// `0.4 s`, `12 s`, `3 min 05 s`, `2 h 07 min`.
-fn rough(time: Duration) -> String {
+pub fn rough(time: Duration) -> String {
     let seconds = time.as_secs_f64();
     let whole = seconds.round() as u64;
     match whole {

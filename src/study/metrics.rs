@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::film::exr_file::{self, Contents};
 use crate::film::{Image, Plane};
 
-/// Keeps dark pixels from deciding relMSE alone (PEERS.md's constant, so that figures compare).
-const FLOOR: f64 = 0.01;
+/// Keeps dark pixels from deciding relMSE alone (the constant that is customary, so that figures compare).
+pub(super) const FLOOR: f64 = 0.01;
 
 /// An image that counts as the truth, with what is known of its own noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,8 +35,9 @@ pub struct Errors {
     pub smape: f64,
     /// Σ x / Σ r: brightness.
     pub mean_ratio: f64,
-    /// Standard error of [`mean_ratio`](Errors::mean_ratio) that comes of the reference's own noise; 0 where that is
-    /// not known.
+    /// Standard error of [`mean_ratio`](Errors::mean_ratio) that comes of the reference's own noise, 0 where that is not
+    /// known. Pixels are taken as independent and the channels of a pixel as varying together, as they do where it is
+    /// the amount of light that is noisy: Var Σ r = Σ over pixels of (√v_R + √v_G + √v_B)².
     pub mean_ratio_error: f64,
     /// What the reference's own variance adds to an uncorrected relMSE: mean(v / (r² + 0.01)); 0 where not known.
     pub reference_rel_mse: f64,
@@ -165,11 +166,15 @@ impl Errors {
     pub fn of(image: &Image, reference: &Reference) -> Errors {
         let truth = &reference.image;
         assert_eq!((image.width, image.height), (truth.width, truth.height), "images of different sizes");
+        let deviation = |pixel: usize| -> f64 {
+            let variance = reference.variance.as_ref().map_or([0.0; 3], |variance| variance.pixels[pixel]);
+            variance.map(|v| f64::from(v).sqrt()).iter().sum()
+        };
         let [mse, rel_mse, smape, ours, theirs, variance, noise] = means(reference, |i, r, v| {
             let x = f64::from(image.pixels.as_flattened()[i]);
             let (square, weight) = ((x - r).powi(2) - v, 1.0 / (r * r + FLOOR));
             let smape = if x == r { 0.0 } else { 2.0 * (x - r).abs() / (x.abs() + r.abs()) };
-            [square, square * weight, smape, x, r, v, v * weight]
+            [square, square * weight, smape, x, r, v.sqrt() * deviation(i / 3), v * weight]
         });
         let n = truth.pixels.as_flattened().len() as f64;
         Errors {
@@ -263,8 +268,9 @@ mod tests {
         assert!((corrected.rel_mse - (over(squares) - over(variances))).abs() < 1e-14);
         assert!((corrected.reference_rel_mse - over(variances)).abs() < 1e-14);
         assert_eq!((corrected.smape, corrected.mean_ratio), (plain.smape, plain.mean_ratio), "these are not corrected");
-        // Σ r = 4 has the variance Σ v = 0.9375
-        assert!((corrected.mean_ratio_error - 3.25 / 4.0 * 0.9375f64.sqrt() / 4.0).abs() < 1e-15);
+        // Σ r = 4; channels vary together
+        let of_sum = (0.125f64.sqrt() + 0.25).powi(2) + (0.5 + 0.5f64.sqrt()).powi(2);
+        assert!((corrected.mean_ratio_error - 3.25 / 4.0 * of_sum.sqrt() / 4.0).abs() < 1e-15);
         let noise = reference.noise().unwrap();
         assert!((noise.mse - mean(variances)).abs() < 1e-15 && noise.rel_mse == corrected.reference_rel_mse);
     }

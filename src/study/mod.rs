@@ -11,6 +11,7 @@ pub mod ladder_text;
 pub mod metrics;
 pub mod record;
 pub mod reference;
+pub mod reference_progress;
 pub mod report;
 pub mod results;
 pub mod run_log;
