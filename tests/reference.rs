@@ -1,8 +1,8 @@
 //! `relt reference`: what it leaves, how good that is, and that nothing interrupts it for good.
 
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use relt::film::{Value, exr_file};
 use relt::study::metrics::{Errors, Reference};
@@ -86,35 +86,47 @@ fn it_leaves_an_image_with_variance_a_text_and_a_state() {
     assert_eq!((code, text.as_str()), (Some(0), ""), "nothing is left to do, and nothing said");
 }
 
-/// Half by the clock, half by signals and kills, then whole: the same bits as without a pause.
+/// Ended by the clock, by a signal and by force, each time in the middle of it: the same bits as without a pause.
 #[test]
 fn interruptions_change_no_bit() {
-    const OPTIONS: [&str; 4] = ["--target-relmse", "2e-4", "--mpp", "128"];
+    const OPTIONS: [&str; 4] = ["--target-relmse", "1e-4", "--mpp", "128"];
     let whole = tempfile::tempdir().unwrap();
     let (code, text) = reference(whole.path(), &OPTIONS);
     assert_eq!(code, Some(0), "{text}");
 
     let folder = tempfile::tempdir().unwrap();
-    let (code, text) = reference(folder.path(), &[&OPTIONS[..], &["--time", "700ms", "--threads", "1"]].concat());
+    let (code, text) = reference(folder.path(), &[&OPTIONS[..], &["--time", "1us"]].concat());
     assert_eq!(code, Some(3), "{text}");
-    assert!(text.contains("--time was over") && text.contains("the same command goes on"), "{text}");
+    assert!(
+        text.contains("--time was over before its first pass was over") && text.contains("smaller --mpp"),
+        "{text}"
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written of nothing");
+
+    // A dozen passes are left when the third is told, far more time than a signal takes.
     let killed = |signal: &str| {
-        let child = command(folder.path(), &OPTIONS).stderr(Stdio::piped()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(700));
+        let mut child =
+            command(folder.path(), &OPTIONS).args(["--threads", "1"]).stderr(Stdio::piped()).spawn().unwrap();
+        let mut errors = BufReader::new(child.stderr.take().unwrap());
+        let mut text = String::new();
+        while text.lines().count() < 4 {
+            assert_ne!(errors.read_line(&mut text).unwrap(), 0, "it ended too early:\n{text}");
+        }
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
         assert!(sent.success());
-        let output = child.wait_with_output().unwrap();
-        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+        errors.read_to_string(&mut text).unwrap();
+        (child.wait().unwrap().code(), text)
     };
     let (code, text) = killed("-INT");
     assert_eq!(code, Some(130), "{text}");
-    assert!(text.contains("going on after ") && text.contains("error: interrupted after "), "{text}");
+    assert!(text.contains("error: interrupted after ") && text.contains("the same command goes on"), "{text}");
     let stopped = Reference::read(&folder.path().join("r.exr")).unwrap();
-    assert!(stopped.noise().unwrap().rel_mse > 2e-4, "what is there is written");
+    assert!(stopped.noise().unwrap().rel_mse > 1e-4, "what is there is written");
     let (code, _) = killed("-KILL");
     assert_eq!(code, None);
     let (code, text) = reference(folder.path(), &OPTIONS);
     assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("going on after "), "{text}");
     for file in ["r.state", "r.txt"] {
         let [a, b] = [&whole, &folder].map(|folder| std::fs::read(folder.path().join(file)).unwrap());
         assert!(a == b, "{file} differs");
@@ -123,11 +135,11 @@ fn interruptions_change_no_bit() {
     let [a, b] = [&whole, &folder].map(|folder| exr_file::read_file(&folder.path().join("r.exr")).unwrap());
     assert!(a == b, "r.exr differs: {:?} and {:?}", a.metadata, b.metadata);
 
-    // a higher target is reached already; a lower one goes on from where it was
-    let (code, text) = reference(folder.path(), &["--target-relmse", "1.5e-4", "--mpp", "128"]);
+    // a lower target goes on from where it was
+    let (code, text) = reference(folder.path(), &["--target-relmse", "8e-5", "--mpp", "128"]);
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("going on after "), "{text}");
-    assert!(Reference::read(&folder.path().join("r.exr")).unwrap().noise().unwrap().rel_mse < 1.5e-4);
+    assert!(Reference::read(&folder.path().join("r.exr")).unwrap().noise().unwrap().rel_mse < 8e-5);
 }
 
 #[test]

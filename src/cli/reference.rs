@@ -116,10 +116,7 @@ pub(super) fn run(arguments: Reference) -> Result<(), Failure> {
     saved.now(&passes)?;
     let written = files.write(&recipe, &opened, &passes, arguments.target_relmse)?;
     progress.ended(&passes, if written { files.all() } else { Vec::new() });
-    match reached {
-        true => Ok(()),
-        false => Err(arguments.unfinished(&passes, stop.load(Relaxed))),
-    }
+    if reached { Ok(()) } else { Err(arguments.unfinished(&passes, stop.load(Relaxed))) }
 }
 
 impl Reference {
@@ -168,9 +165,10 @@ impl Reference {
             0 => "nothing is written; a smaller --mpp makes shorter passes",
             _ => "the same command goes on",
         };
-        match interrupted {
-            true => Failure::Interrupted(format!("interrupted {so_far}, target {target}; {go_on}")),
-            false => Failure::Exceeded(vec![format!("--time was over {so_far}, target {target}; {go_on}")]),
+        if interrupted {
+            Failure::Interrupted(format!("interrupted {so_far}, target {target}; {go_on}"))
+        } else {
+            Failure::Exceeded(vec![format!("--time was over {so_far}, target {target}; {go_on}")])
         }
     }
 }
@@ -252,15 +250,15 @@ impl Files {
         if self.state.exists() {
             return read_state(&self.state, recipe).map_err(Failure::input);
         }
-        match self.image.exists() {
-            true => Err(Failure::input(format_args!(
+        if self.image.exists() {
+            return Err(Failure::input(format_args!(
                 "{} is there, but {} is not, without which it cannot be gone on with; choose another --output, or delete \
                  the image to begin anew",
                 self.image.display(),
                 self.state.display()
-            ))),
-            false => Ok(Passes::new(recipe.width, recipe.height)),
+            )));
         }
+        Ok(Passes::new(recipe.width, recipe.height))
     }
 
     /// Writes image and text; nothing, and false, if there is no pass yet.
@@ -342,9 +340,9 @@ fn description(
 /// The command as one could type it.
 fn command_line(arguments: impl Iterator<Item = String>) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
-    let quoted = arguments.map(|word| match !word.is_empty() && word.chars().all(plain) {
-        true => word,
-        false => format!("'{}'", word.replace('\'', r"'\''")),
+    let quoted = arguments.map(|word| {
+        let plain = !word.is_empty() && word.chars().all(plain);
+        if plain { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
     });
     [String::from("relt")].into_iter().chain(quoted).collect::<Vec<_>>().join(" ")
 }

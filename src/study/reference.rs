@@ -224,9 +224,10 @@ impl Recipe {
         differ("--mpp", self.mutations_per_pixel.to_string(), other.mutations_per_pixel.to_string());
         differ("--seed", self.seed.to_string(), other.seed.to_string());
         if self.fingerprint != other.fingerprint {
-            differences.push(match self.scene == other.scene {
-                true => format!("other contents of the files of {}", self.scene),
-                false => format!("scene {}, not {}", self.scene, other.scene),
+            differences.push(if self.scene == other.scene {
+                format!("other contents of the files of {}", self.scene)
+            } else {
+                format!("scene {}, not {}", self.scene, other.scene)
             });
         }
         differences

@@ -100,9 +100,10 @@ impl ReferenceProgress {
             }
             line
         };
-        match line {
-            true => self.say(&words),
-            false => self.within_pass(0.0, false),
+        if line {
+            self.say(&words);
+        } else {
+            self.within_pass(0.0, false);
         }
     }
 
