@@ -1,6 +1,6 @@
 //! The charts of a report.
 
-use super::figures::short;
+use super::figures::{self, short};
 use crate::render::progress::significant;
 use crate::study::results::{Clock, Results};
 use crate::study::statistics::compare::Bounded;
@@ -139,83 +139,87 @@ fn guide(x: &Axis, y: &Axis, all: impl Iterator<Item = [f64; 2]>) -> Series {
     series("", Style::guide(), Marks::Lines, [inside(from), inside(to)])
 }
 
+/// A value of a method with its interval.
+struct Whisker<'a> {
+    method: &'a MethodSummary<'a>,
+    /// Infinite where it is open.
+    low: f64,
+    /// None where only a bound is known.
+    middle: Option<f64>,
+    /// Infinite where it is open.
+    high: f64,
+    /// The value in words.
+    words: String,
+}
+
 /// How much too bright images are, with intervals; none where nothing is known.
-pub fn brightness(styles: &Styles, scene: &SceneSummary) -> Option<Chart> {
-    let rows: Vec<(&MethodSummary, [f64; 3])> = scene
-        .methods
-        .iter()
-        .filter_map(|method| {
-            let error = method.brightness?.error;
-            let half = if error.half.is_finite() { error.half } else { 0.0 };
-            Some((method, [error.mean - half, error.mean, error.mean + half].map(|share| 100.0 * share)))
-        })
-        .collect();
-    let furthest = rows.iter().flat_map(|(_, ends)| ends).map(|end| end.abs()).reduce(f64::max)?;
+pub fn brightness<'a>(styles: &Styles, scene: &'a SceneSummary<'a>) -> Option<Chart> {
+    let whisker = |method: &'a MethodSummary<'a>| {
+        let error = method.brightness?.error;
+        let half = if error.half.is_finite() { error.half } else { 0.0 };
+        let [low, middle, high] = [error.mean - half, error.mean, error.mean + half].map(|share| 100.0 * share);
+        Some(Whisker { method, low, middle: Some(middle), high, words: significant(middle, 2) + " %" })
+    };
+    let whiskers: Vec<Whisker> = scene.methods.iter().filter_map(whisker).collect();
+    let furthest = whiskers.iter().flat_map(|at| [at.low.abs(), at.high.abs()]).reduce(f64::max)?;
     let furthest = if furthest > 0.0 { 1.05 * furthest } else { 1.0 };
     let x = Axis::linear("brightness error in %, 95 % interval", [-furthest, furthest]);
-    Some(dots(
-        styles,
-        scene,
-        "brightness",
-        &format!("{}: brightness against the reference", scene.scene.name),
-        x,
-        0.0,
-        &rows,
-    ))
+    let title = format!("{}: brightness against the reference", scene.scene.name);
+    Some(whisker_chart(styles, scene, "brightness", title, x, 0.0, &whiskers))
 }
 
 /// How many times as fast as the baseline methods reach the headline's error; none where nothing is known.
-pub fn speed_ups(styles: &Styles, scene: &SceneSummary) -> Option<Chart> {
+pub fn speed_ups<'a>(styles: &Styles, scene: &'a SceneSummary<'a>) -> Option<Chart> {
     let target = scene.headline?;
-    let rows: Vec<(&MethodSummary, [f64; 3])> = scene
-        .methods
-        .iter()
-        .filter(|method| !method.is_baseline)
-        .filter_map(|method| {
-            let ratio = method.speed_ups[target]?;
-            // An open end is drawn as far as it is known.
-            let [low, high] = ratio.interval.unwrap_or([ratio.value; 2]).map(Bounded::value);
-            let value = ratio.value.value();
-            Some((method, [low.min(value), value, high.max(value)]))
+    let whisker = |method: &'a MethodSummary<'a>| {
+        let ratio = method.speed_ups[target]?;
+        let [low, high] = ratio.interval.unwrap_or([ratio.value; 2]);
+        Some(Whisker {
+            method,
+            low: low.at_least().unwrap_or(f64::NEG_INFINITY),
+            middle: matches!(ratio.value, Bounded::Exactly(_)).then_some(ratio.value.value()),
+            high: high.at_most().unwrap_or(f64::INFINITY),
+            words: figures::ratio(Some(&ratio)),
         })
-        .collect();
-    if rows.is_empty() {
+    };
+    let whiskers: Vec<Whisker> =
+        scene.methods.iter().filter(|method| !method.is_baseline).filter_map(whisker).collect();
+    if whiskers.is_empty() {
         return None;
     }
     let baseline = scene.methods.iter().find(|method| method.is_baseline).map_or("the baseline", |m| &m.method.name);
-    let x = Axis::log(
-        &format!("times as fast as {baseline}, 95 % interval"),
-        rows.iter().flat_map(|row| row.1).chain([1.0]),
-    );
-    let error = short(scene.targets[target]);
-    let title = format!("{}: speed-up to √relMSE {error}", scene.scene.name);
-    Some(dots(styles, scene, "speed-up", &title, x, 1.0, &rows))
+    let known = whiskers.iter().flat_map(|at| [at.low, at.middle.unwrap_or(f64::NAN), at.high]);
+    let known: Vec<f64> = known.chain([1.0]).filter(|value| value.is_finite()).collect();
+    let x = Axis::log(&format!("times as fast as {baseline}, 95 % interval"), known.into_iter());
+    let title = format!("{}: speed-up to √relMSE {}", scene.scene.name, short(scene.targets[target]));
+    Some(whisker_chart(styles, scene, "speed-up", title, x, 1.0, &whiskers))
 }
 
-/// A row for each method with a dot and its interval, and a line at what counts as no difference.
-fn dots(
+/// A row for each method with a dot and its interval, to the frame where that is open; and a line at what counts as no
+/// difference.
+fn whisker_chart(
     styles: &Styles,
     scene: &SceneSummary,
     what: &str,
-    title: &str,
+    title: String,
     x: Axis,
     neutral: f64,
-    rows: &[(&MethodSummary, [f64; 3])],
+    whiskers: &[Whisker],
 ) -> Chart {
-    let names: Vec<String> = rows.iter().map(|(method, _)| method.method.name.clone()).collect();
-    let height = -(rows.len() as f64);
-    let line = series("", Style::guide(), Marks::Lines, [[neutral, 0.5], [neutral, height + 0.5]]);
-    let mut all = vec![line];
-    for (i, (method, [low, middle, high])) in rows.iter().enumerate() {
+    let names: Vec<String> = whiskers.iter().map(|at| at.method.method.name.clone()).collect();
+    let bottom = 0.5 - whiskers.len() as f64;
+    let mut all = vec![series("", Style::guide(), Marks::Lines, [[neutral, 0.5], [neutral, bottom]])];
+    let [least, greatest] = x.ends();
+    for (i, Whisker { method, low, middle, high, .. }) in whiskers.iter().enumerate() {
         let (style, y) = (styles.style(&method.method.name), -(i as f64));
-        all.push(series("", style.colour.into(), Marks::Segments, [[*low, y], [*high, y]]));
-        all.push(series("", style, Marks::Dots, [[*middle, y]]));
+        let ends = [low.max(least + 1e-9 * least.abs()), high.min(greatest)]; // a hair inside
+        all.push(series("", style.colour.into(), Marks::Segments, ends.map(|end| [end, y])));
+        all.push(series("", style, Marks::Dots, middle.map(|middle| [middle, y])));
     }
-    let values: Vec<String> =
-        rows.iter().map(|(method, ends)| format!("{} {}", method.method.name, significant(ends[1], 3))).collect();
+    let values: Vec<String> = whiskers.iter().map(|at| format!("{} {}", at.method.method.name, at.words)).collect();
     let words = format!("{title}: {}", values.join(", "));
-    let size = [SIZE[0], 104.0 + 24.0 * rows.len() as f64];
-    let panel = Panel { title: title.into(), x, y: Axis::named("", &names), series: all };
+    let size = [SIZE[0], 104.0 + 24.0 * whiskers.len() as f64];
+    let panel = Panel { title, x, y: Axis::named("", &names), series: all };
     chart(scene, what, words, size, &panel)
 }
 

@@ -142,7 +142,9 @@ fn summary_section(styles: &Styles, summaries: &[SceneSummary]) -> String {
          [95 % interval]. Efficiency: 1/(relMSE · seconds) at the end over the baseline's. {BEST} best of a column; \
          {FLAG} look at it: a brightness interval that excludes 0, or a slope interval that excludes −0.6 to −0.4. \
          <a href=\"#reading\">More</a></p>\n<div class=\"charts\">\n{}</div>\n</section>\n",
-        charts.map(|chart| figure(&chart, "")).collect::<String>()
+        charts
+            .map(|chart| figure(&chart, "A line that goes to the frame is open: runs did not reach the error."))
+            .collect::<String>()
     )
 }
 

@@ -41,6 +41,14 @@ impl Bounded {
         }
     }
 
+    /// What it is not more than, if that is known.
+    pub fn at_most(self) -> Option<f64> {
+        match self {
+            Bounded::AtLeast(_) => None,
+            Bounded::Exactly(value) | Bounded::AtMost(value) => Some(value),
+        }
+    }
+
     /// For orders: bounds are beyond all numbers.
     fn key(self) -> f64 {
         match self {
@@ -241,6 +249,7 @@ mod tests {
         assert_eq!(speed_up(&[At(1.0)], &all(At(1.0))).unwrap().interval, None, "one run tells no spread");
         let bounds = [Bounded::AtMost(2.0), Bounded::Exactly(2.0), Bounded::AtLeast(2.0)].map(Bounded::at_least);
         assert_eq!(bounds, [None, Some(2.0), Some(2.0)]);
+        assert_eq!((Bounded::AtLeast(2.0).at_most(), Bounded::AtMost(2.0).at_most()), (None, Some(2.0)));
         // Two of five never reach it: some resamples have medians that are bounds, and the interval is open above.
         let open = [After(30.0), After(30.0), At(10.0), At(11.0), At(12.0)];
         let ratio = speed_up(&open, &all(At(5.0))).unwrap();
