@@ -73,7 +73,7 @@ fn a_study_leaves_runs_images_tables_plots_and_a_page() {
     assert!(text.trim_end().ends_with("small/report.html"), "{text}");
     assert!(progress.contains("6/6 cornell-box, "), "{progress}");
     let result = folder.path().join("small");
-    for name in ["report.html", "results.csv", "study.toml", "runs", "images", "plots"] {
+    for name in ["report.html", "results.csv", "study.toml", "runs", "pictures/cornell-box-mlt-error.png"] {
         assert!(result.join(name).exists(), "{name}");
     }
     assert!(std::fs::read_to_string(result.join("report.html")).unwrap().contains("What for."));

@@ -36,7 +36,7 @@ pub(super) struct Compare {
     #[arg(long)]
     json: bool,
 
-    /// Draws errors: x.png gets the relative error of luminance, (x − r) / (r + 0.1), white for none, blue for too dark,
+    /// Draws errors: x.png gets the relative error of luminance, (x − r)/√(r² + 0.01), white for none, blue for too dark,
     /// red for too bright, and x-flip.png the HDR-FLIP map from black, 0, to pale yellow, 1; x.exr gets the former with
     /// the numbers in layers `error` (by channel) and `flip`; several images need a folder, which gets IMAGE-error.png
     /// and IMAGE-error-flip.png of each

@@ -25,8 +25,8 @@ use crate::study::reference_progress::ReferenceProgress;
 ///
 /// Writes the mean of the passes with the variance of that mean by pixel (channels variance.R, .G, .B), and a text of the
 /// same name that says how it was made and how good it is. Two estimates of its own relMSE, from the spread of passes and
-/// from the difference of even and odd ones, must both be below the target, after 8 passes at least. What they have left
-/// XX
+/// from the difference of even and odd ones, must both be below the target, after 8 passes at least. Neither sees
+/// light that no pass met, nor a bias that all passes share
 #[derive(Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub(super) struct Reference {

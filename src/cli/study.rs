@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::failure::Failure;
 use super::{render, signals};
-use crate::film::file::write_whole;
+use crate::film::file::{FileError, write_whole};
 use crate::render::{Observer, Settings, Status};
 use crate::study::collect::collect;
 use crate::study::file::{self, Budget, Study};
@@ -171,13 +171,16 @@ fn write_report(study: &Study, prepared: &[Prepared], jobs: &[StudyJob], folder:
     let results = collect(study, prepared, jobs, folder, &command).map_err(Failure::running)?;
     let path = folder.path();
     report::write(&results, path).map_err(Failure::running)?;
-    let plots = path.join("plots");
-    std::fs::create_dir_all(&plots)
-        .map_err(|error| Failure::running(format_args!("cannot write {}: {error}", plots.display())))?;
-    let tables = [("results.csv".into(), report::csv(&results)), ("study.toml".into(), study.text.clone())];
-    let plots = report::plots(&results).into_iter().map(|(name, svg)| (Path::new("plots").join(name), svg));
-    for (name, text) in plots.chain(tables) {
-        write_whole(&path.join(name), |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))
+    let folders = ["plots", "pictures"];
+    for folder in folders.map(|name| path.join(name)) {
+        std::fs::create_dir_all(&folder).map_err(|error| Failure::running(FileError::write(&folder, error)))?;
+    }
+    let tables = [("results.csv".to_owned(), report::csv(&results)), ("study.toml".into(), study.text.clone())];
+    let plots = report::plots(&results).into_iter().map(|(name, svg)| (format!("plots/{name}"), svg));
+    let texts = plots.chain(tables).map(|(name, text)| (name, text.into_bytes()));
+    let pictures = report::images(&results).into_iter().map(|(name, png)| (format!("pictures/{name}"), png));
+    for (name, bytes) in texts.chain(pictures) {
+        write_whole(&path.join(name), |file| file.write_all(&bytes).map_err(|error| error.to_string()))
             .map_err(Failure::running)?;
     }
     Ok(report::text(&results))
@@ -293,6 +296,19 @@ mod tests {
         assert!(message.starts_with("invalid value 'mtl' for '--method") && !message.contains("Usage"), "{message}");
         let message = parse_options(&words("--method path --replicas 2")).unwrap_err();
         assert!(message.starts_with("--replicas: --method path has no ladder"), "{message}");
+    }
+
+    #[test]
+    fn studies_that_ship_can_be_run() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
+        let mut studies = 0;
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let study = file::read(&entry.unwrap().path(), &parse_options).unwrap_or_else(|error| panic!("{error}"));
+            let prepared = prepare(&study).unwrap_or_else(|faults| panic!("{faults:?}"));
+            assert_eq!(jobs(&study, &prepared).len(), study.scenes.len() * study.methods.len() * study.seeds.len());
+            studies += 1;
+        }
+        assert!(studies >= 4);
     }
 
     #[test]

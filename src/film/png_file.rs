@@ -8,36 +8,27 @@ use super::image::Image;
 
 /// Writes the image as it looks on a screen: linear 1 is full brightness, what is brighter is clipped.
 pub fn write(path: &Path, image: &Image) -> Result<(), FileError> {
-    let bytes = screen_bytes(image);
-    write_whole(path, |file| encode_to(file, [image.width, image.height], &bytes))
+    write_whole(path, |file| encode_to(file, image))
 }
 
 /// The same file in memory.
-pub fn encode(image: &Image) -> Vec<u8> {
-    encode_bytes([image.width, image.height], &screen_bytes(image))
-}
-
-/// A file in memory of sRGB bytes, three a pixel, top row first.
 ///
 /// # Panics
-/// If their number is not three times width times height, or one of these is 0.
-pub fn encode_bytes([width, height]: [u32; 2], bytes: &[u8]) -> Vec<u8> {
+/// If the image has no pixels.
+pub fn encode(image: &Image) -> Vec<u8> {
     let mut file = Vec::new();
-    encode_to(&mut file, [width, height], bytes).expect("memory takes what is written");
+    encode_to(&mut file, image).expect("memory takes what is written");
     file
 }
 
-fn screen_bytes(image: &Image) -> Vec<u8> {
-    image.pixels.as_flattened().iter().map(|&value| srgb_byte(value)).collect()
-}
-
-fn encode_to(file: impl Write, [width, height]: [u32; 2], bytes: &[u8]) -> Result<(), String> {
-    let mut encoder = png::Encoder::new(BufWriter::new(file), width, height);
+fn encode_to(file: impl Write, image: &Image) -> Result<(), String> {
+    let bytes: Vec<u8> = image.pixels.as_flattened().iter().map(|&value| srgb_byte(value)).collect();
+    let mut encoder = png::Encoder::new(BufWriter::new(file), image.width, image.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-    writer.write_image_data(bytes).map_err(|error| error.to_string())?;
+    writer.write_image_data(&bytes).map_err(|error| error.to_string())?;
     writer.finish().map_err(|error| error.to_string())
 }
 

@@ -5,31 +5,41 @@
 
 use std::f32::consts::{PI, TAU};
 
+use super::metrics::FLOOR;
 use crate::film::Image;
-use crate::film::image::LUMINANCE;
 
-/// Added to a reference's value, so that errors in the dark do not count for more than on a dark gray.
-const FLOOR: f32 = 0.1;
-
-/// Signed relative error of every channel, (x − r) / (|r| + 0.1).
+/// Signed relative error of every channel, (x − r)/√(r² + 0.01), whose mean square is relMSE.
 ///
 /// # Panics
 /// If sizes differ; so do the others.
 pub fn relative(image: &Image, reference: &Image) -> Image {
     assert_eq!((image.width, image.height), (reference.width, reference.height), "images of different sizes");
     let pairs = image.pixels.iter().zip(&reference.pixels);
-    let pixels = pairs.map(|(x, r)| [0, 1, 2].map(|c| (x[c] - r[c]) / (r[c].abs() + FLOOR))).collect();
+    let pixels = pairs.map(|(x, r)| [0, 1, 2].map(|c| relative_error(x[c], r[c]))).collect();
     Image::new(image.width, image.height, pixels)
 }
 
-/// The signed relative error of luminance, (x − r) / (|r| + 0.1), in colours, linear RGB: white where there is none,
-/// blue where the image is too dark, red where it is too bright, full colours from an error of `range` on.
+fn relative_error(x: f32, r: f32) -> f32 {
+    (x - r) / (r * r + FLOOR as f32).sqrt()
+}
+
+/// The signed relative error of luminance in colours, linear RGB: white where there is none, blue where the image is too
+/// dark, red where it is too bright, full colours from an error of `range` on. Colours go with the square root of the
+/// error, so that a hundredth of the range is visible and a quarter is not the whole.
 pub fn signed_colours(image: &Image, reference: &Image, range: f32) -> Image {
     assert_eq!((image.width, image.height), (reference.width, reference.height), "images of different sizes");
-    let luminance = |rgb: &[f32; 3]| (0..3).map(|c| rgb[c] * LUMINANCE[c]).sum::<f32>();
-    let pairs = image.pixels.iter().zip(&reference.pixels);
-    let errors = pairs.map(|(x, r)| (luminance(x) - luminance(r)) / (luminance(r).abs() + FLOOR));
-    Image::new(image.width, image.height, errors.map(|error| diverging(error / range)).collect())
+    let errors = image.luminance().into_iter().zip(reference.luminance()).map(|(x, r)| relative_error(x, r));
+    Image::new(image.width, image.height, errors.map(|error| signed_colour(error / range)).collect())
+}
+
+/// The colours of errors from minus the range to the range, a row of so many pixels, evenly by square root.
+pub fn signed_strip(width: u32) -> Image {
+    let root = |i: u32| 2.0 * i as f32 / (width.max(2) - 1) as f32 - 1.0;
+    Image::new(width, 1, (0..width).map(|i| diverging(root(i))).collect())
+}
+
+fn signed_colour(error: f32) -> [f32; 3] {
+    diverging(error.abs().sqrt().copysign(error))
 }
 
 /// Numbers from 0 to 1 in colours, linear RGB: black, violet, red, orange, pale yellow.
@@ -41,7 +51,7 @@ pub fn rising_colours(width: u32, height: u32, values: &[f32]) -> Image {
 fn diverging(value: f32) -> [f32; 3] {
     const BLUE: f32 = 262.0 / 360.0;
     const RED: f32 = 27.0 / 360.0;
-    let size = value.abs().min(1.0);
+    let size = value.abs().min(1.0); // 1 for NaN
     oklch(1.0 - 0.55 * size, 0.2 * size, if value < 0.0 { BLUE } else { RED })
 }
 
@@ -81,8 +91,9 @@ mod tests {
     fn no_error_is_white_and_signs_have_colours() {
         let reference = Image::constant(4, 1, [0.4; 3]);
         let mut image = reference.clone();
-        image.pixels[1] = [0.65; 3]; // + 0.5
-        image.pixels[2] = [0.15; 3]; // − 0.5
+        let (step, half) = (0.05 * 17f32.sqrt(), [1, 2]); // √(0.4² + 0.01) = √17/10, half of which makes an error of 0.5
+        image.pixels[half[0]] = [0.4 + step; 3];
+        image.pixels[half[1]] = [0.4 - step; 3];
         image.pixels[3] = [9.0; 3];
         let relative = relative(&image, &reference);
         assert!((relative.pixels[1][0] - 0.5).abs() < 1e-6 && (relative.pixels[2][2] + 0.5).abs() < 1e-6);
@@ -91,6 +102,11 @@ mod tests {
         assert!(bright[0] > 4.0 * bright[1] && bright[0] > 4.0 * bright[2], "{bright:?} is red");
         assert!(dark[2] > 4.0 * dark[0] && dark[2] > 2.0 * dark[1], "{dark:?} is blue");
         assert!((0..3).all(|c| (beyond[c] - bright[c]).abs() < 1e-5), "colours are full at the range: {beyond:?}");
+        let quarter = signed_colours(&image, &reference, 2.0).pixels[1];
+        assert!((0..3).all(|c| (quarter[c] - diverging(0.5)[c]).abs() < 1e-5), "half of them at a quarter of it");
+        let strip = signed_strip(201).pixels;
+        assert_eq!([strip[0], strip[100], strip[200]], [diverging(-1.0), diverging(0.0), diverging(1.0)]);
+        assert_eq!(signed_colour(f32::NAN), diverging(1.0), "what is no number is as wrong as can be");
     }
 
     #[test]

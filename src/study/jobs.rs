@@ -1,9 +1,11 @@
 //! The runs of a study: which there are, in which order, and under which names they are kept.
 
-use std::fmt::{self, Write};
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use super::checksum::Checksum;
 use super::file::{Budget, Study};
+use super::file_name;
 use super::metrics::Reference;
 use crate::load;
 use crate::render::Settings;
@@ -36,24 +38,12 @@ pub struct Prepared {
 impl Prepared {
     /// Of a scene as it was read, and its reference.
     pub fn new(description: &SceneDescription, reference: Reference) -> Prepared {
-        let mut checksum = Checksum::default();
-        write!(checksum, "{description:?}").expect("checksums take all");
+        let mut checksum = Checksum::of_scene(description);
         for image in [Some(&reference.image), reference.variance.as_ref()].into_iter().flatten() {
-            image.pixels.as_flattened().iter().for_each(|value| checksum.0.update(&value.to_le_bytes()));
+            image.pixels.as_flattened().iter().for_each(|value| checksum.add(&value.to_le_bytes()));
         }
         let size = [description.film.width, description.film.height];
-        Prepared { size, reference, checksum: checksum.0.finalize() }
-    }
-}
-
-/// CRC-32 of a text as it is written.
-#[derive(Default)]
-struct Checksum(crc32fast::Hasher);
-
-impl Write for Checksum {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0.update(text.as_bytes());
-        Ok(())
+        Prepared { size, reference, checksum: checksum.finish() }
     }
 }
 
@@ -118,13 +108,7 @@ fn id(study: &Study, prepared: &Prepared, scene: usize, method: usize, seed: u64
     let parts =
         (prepared.checksum, &options.options, seed, study.budget, study.snapshot_times(), keeps_images(study, seed));
     write!(checksum, "{parts:?} {program}").expect("checksums take all");
-    format!("{}-{}-{seed}-{:08x}", file_name(&names.name), file_name(&options.name), checksum.0.finalize())
-}
-
-/// Letters, digits and single dashes.
-fn file_name(name: &str) -> String {
-    let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
-    words.collect::<Vec<_>>().join("-").to_lowercase()
+    format!("{}-{}-{seed}-{:08x}", file_name(&names.name), file_name(&options.name), checksum.finish())
 }
 
 /// The copy of a scene's reference, from the study's folder on.

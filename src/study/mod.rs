@@ -1,5 +1,6 @@
 //! What runs leave behind, read and drawn.
 
+pub mod checksum;
 pub mod collect;
 pub mod error_image;
 pub mod file;
@@ -18,3 +19,21 @@ pub mod run_log;
 pub mod runner;
 pub mod statistics;
 mod svg;
+
+/// A name as a part of a file's name: letters and digits in lower case, all else as one dash.
+fn file_name(name: &str) -> String {
+    let words: Vec<String> =
+        name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase).collect();
+    if words.is_empty() { "unnamed".into() } else { words.join("-") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::file_name;
+
+    #[test]
+    fn names_become_parts_of_file_names() {
+        assert_eq!(file_name("Door, K = 4/../x"), "door-k-4-x");
+        assert_eq!(file_name("../"), "unnamed");
+    }
+}

@@ -7,12 +7,12 @@
 //! A state file holds the exact sums, so a reference can be gone on with after any interruption, bit by bit as if there
 //! had been none: passes are always added in their order, and only whole ones.
 
-use std::fmt::{self, Write as _};
 use std::io::Write as _;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::checksum::Checksum;
 use super::metrics::{FLOOR, Reference};
 use crate::film::Image;
 use crate::film::file::{FileError, write_whole};
@@ -234,46 +234,13 @@ impl Recipe {
     }
 }
 
-/// A number that is another one when anything in the scene's files changes that could change the image, however they are
-/// called: 64-bit FNV-1a over the description in words, which has every number with all its digits.
+/// [`Checksum`] of the scene's files, in hexadecimal digits.
 pub fn fingerprint(scene: &SceneDescription) -> String {
-    let mut hash = Fnv::default();
-    write!(hash, "{scene:?}").expect("a hash takes everything");
-    format!("{:016x}", hash.0)
-}
-
-/// Fowler, Noll and Vo's hash; against accidents, not against malice.
-struct Fnv(u64);
-
-impl Default for Fnv {
-    fn default() -> Fnv {
-        Fnv(0xcbf2_9ce4_8422_2325)
-    }
-}
-
-impl Fnv {
-    fn add(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    }
-
-    fn of(bytes: &[u8]) -> u64 {
-        let mut hash = Fnv::default();
-        hash.add(bytes);
-        hash.0
-    }
-}
-
-impl fmt::Write for Fnv {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.add(text.as_bytes());
-        Ok(())
-    }
+    format!("{:08x}", Checksum::of_scene(scene).finish())
 }
 
 /// First line of a state file. After it: mean and sums of squares of all values of even passes and of odd ones as
-/// little-endian doubles, and FNV-1a of everything before it.
+/// little-endian doubles, and the [`Checksum`] of everything before it.
 #[derive(Serialize, Deserialize)]
 struct Header {
     /// Of the format.
@@ -295,7 +262,7 @@ pub fn write_state(path: &Path, recipe: &Recipe, passes: &Passes) -> Result<(), 
     for value in passes.halves.iter().flat_map(|half| half.mean.iter().chain(&half.squares)) {
         bytes.extend(value.to_le_bytes());
     }
-    let check = Fnv::of(&bytes).to_le_bytes();
+    let check = Checksum::of(&bytes).to_le_bytes();
     bytes.extend(check);
     write_whole(path, |file| file.write_all(&bytes).map_err(|error| error.to_string()))
 }
@@ -335,7 +302,7 @@ pub fn read_state(path: &Path, recipe: &Recipe) -> Result<Passes, StateError> {
     let (content, check) = bytes.split_last_chunk().ok_or_else(damaged)?;
     let values = 3 * header.recipe.width as usize * header.recipe.height as usize;
     let numbers = content.get(header_end + 1..).ok_or_else(damaged)?;
-    if u64::from_le_bytes(*check) != Fnv::of(content) || numbers.len() != 4 * 8 * values {
+    if u32::from_le_bytes(*check) != Checksum::of(content) || numbers.len() != 4 * 8 * values {
         return Err(damaged().into());
     }
     let differences = header.recipe.differences(recipe);

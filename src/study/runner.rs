@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::checksum::Checksum;
 use super::file::{Budget, Study};
 use super::jobs::{Prepared, StudyJob, keeps_images, reference_image, scene_words};
 use super::metrics::{Errors, Reference};
@@ -101,7 +102,7 @@ impl Folder {
 pub fn this_program() -> String {
     let version = concat!("relt ", env!("CARGO_PKG_VERSION"));
     match std::env::current_exe().and_then(fs::read) {
-        Ok(bytes) => format!("{version} (executable {:08x})", crc32fast::hash(&bytes)),
+        Ok(bytes) => format!("{version} (executable {:08x})", Checksum::of(&bytes)),
         Err(_) => version.to_owned(),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::figures::{self, short};
 use crate::render::progress::significant;
+use crate::study::file_name;
 use crate::study::results::{Clock, Results};
 use crate::study::statistics::compare::Bounded;
 use crate::study::statistics::curves::{Against, Moment, spread_over};
@@ -54,13 +55,6 @@ fn chart(scene: &SceneSummary, what: &str, words: String, [width, height]: [f64;
     let mut page = Page::new(width, height);
     page.panel(Area { x: 4.0, y: 2.0, width: width - 8.0, height: height - 4.0 }, panel);
     Chart { file: format!("{}-{what}.svg", file_name(&scene.scene.name)), words, svg: page.finish() }
-}
-
-/// Letters and digits in lower case, all else as one dash.
-pub fn file_name(name: &str) -> String {
-    let words: Vec<String> =
-        name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase).collect();
-    if words.is_empty() { "scene".into() } else { words.join("-") }
 }
 
 fn series(name: &str, style: Style, marks: Marks, data: impl IntoIterator<Item = [f64; 2]>) -> Series {
@@ -300,15 +294,4 @@ fn trips_by_replicas(scene: &SceneSummary, number: usize, scaling: &Scaling) -> 
     let what = format!("replicas-{}-round-trips", number + 1);
     let panel = Panel { title: title.clone(), x: number_axis(scaling), y, series: all };
     Some(chart(scene, &what, title, SIZE, &panel))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_files_hold_letters_and_digits_only() {
-        assert_eq!(file_name("Door, K = 4/../x"), "door-k-4-x");
-        assert_eq!(file_name("../"), "scene");
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::charts::{self, Chart, Styles};
 use super::figures::{BEST, Cell, FLAG, Table, short_with};
-use super::pictures::{Picture, colour_strip, pictures};
+use super::pictures::{Picture, colour_strip, embedded, pictures};
 use super::tables;
 use crate::render::progress::significant;
 use crate::study::results::{Clock, Results, Run};
@@ -275,8 +275,8 @@ fn viewer(number: usize, scene: &SceneSummary, pictures: &[Picture]) -> String {
 }
 
 fn thumbnail(picture: &Picture, [width, height]: [u32; 2]) -> String {
-    let image = |class: &str, name: &str, data: &str| {
-        let name = escaped(name);
+    let image = |class: &str, name: &str, png: &[u8]| {
+        let (name, data) = (escaped(name), embedded(png));
         format!(
             "<div class=\"{class}\"><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{name}\" \
              data-name=\"{name}\"/></div>\n"

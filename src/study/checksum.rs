@@ -1,0 +1,58 @@
+//! Numbers that are others when something has changed: against accidents, not against malice.
+
+use std::fmt;
+
+use crate::scene::SceneDescription;
+
+/// CRC-32 of texts and bytes as they come.
+#[derive(Default)]
+pub struct Checksum(crc32fast::Hasher);
+
+impl Checksum {
+    /// Of a scene as it was read: another one when anything in its files changes that could change the image, however
+    /// they are called. It is over the description in words, which has every number with all its digits.
+    pub fn of_scene(scene: &SceneDescription) -> Checksum {
+        let mut checksum = Checksum::default();
+        fmt::Write::write_fmt(&mut checksum, format_args!("{scene:?}")).expect("checksums take all");
+        checksum
+    }
+
+    /// Of some bytes.
+    pub fn of(bytes: &[u8]) -> u32 {
+        crc32fast::hash(bytes)
+    }
+
+    /// Adds bytes.
+    pub fn add(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The number.
+    pub fn finish(self) -> u32 {
+        self.0.finalize()
+    }
+}
+
+impl fmt::Write for Checksum {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.add(text.as_bytes());
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write;
+
+    use super::*;
+
+    #[test]
+    fn pieces_make_the_whole() {
+        let mut pieces = Checksum::default();
+        pieces.add(b"123");
+        write!(pieces, "{}", 456).unwrap();
+        pieces.add(b"789");
+        assert_eq!(pieces.finish(), Checksum::of(b"123456789"));
+        assert_eq!(Checksum::of(b"123456789"), 0xcbf4_3926, "the check value of CRC-32/ISO-HDLC");
+    }
+}
