@@ -104,6 +104,7 @@ fn lights(features: &Features) -> Vec<String> {
     used_and_left_out(&[
         (features.area_lights, "area"),
         (features.point_lights, "point"),
+        (features.directional_lights, "directional"),
         (features.infinite_lights, "constant"),
     ])
 }

@@ -18,8 +18,10 @@ pub struct Features {
     pub lobe_choice: bool,
     /// Surfaces that emit.
     pub area_lights: usize,
-    /// Point lights.
+    /// Point lights, spot lights among them.
     pub point_lights: usize,
+    /// Lights from a single direction.
+    pub directional_lights: usize,
     /// Lights at infinity.
     pub infinite_lights: usize,
     /// Triangle meshes, those with shading normals, spheres, disks.
@@ -70,7 +72,8 @@ impl Features {
             delta_lobes: lobes.iter().any(|l| l.delta_reflection || l.delta_transmission),
             lobe_choice: lobes.iter().any(|l| l.need_choice()),
             area_lights: description.shapes.iter().filter(|s| s.emission.is_some()).count(),
-            point_lights: count(|l| matches!(l, Light::Point(_))),
+            point_lights: count(|l| matches!(l, Light::Point(_) | Light::Spot(_))),
+            directional_lights: count(|l| matches!(l, Light::Directional(_))),
             infinite_lights: count(|l| matches!(l, Light::Constant(_))),
             shapes,
             triangles,
@@ -90,6 +93,7 @@ impl Features {
             (shapes.disks, "disks"),
             (self.area_lights, "area lights"),
             (self.point_lights, "point lights"),
+            (self.directional_lights, "directional lights"),
             (self.infinite_lights, "lights at infinity"),
         ] {
             if n > 0 {
@@ -102,7 +106,7 @@ impl Features {
 
     /// Number of lights of all kinds.
     pub fn lights(&self) -> usize {
-        self.area_lights + self.point_lights + self.infinite_lights
+        self.area_lights + self.point_lights + self.directional_lights + self.infinite_lights
     }
 
     /// Whether choosing among lights takes a primary dimension.
@@ -124,6 +128,7 @@ impl Features {
             (self.shapes.spheres, "spheres"),
             (self.shapes.disks, "disks"),
             (self.point_lights, "point lights"),
+            (self.directional_lights, "directional lights"),
             (self.infinite_lights, "lights at infinity"),
         ];
         materials.chain(others.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned())).collect()

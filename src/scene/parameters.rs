@@ -35,6 +35,8 @@ pub trait Parameters {
     fn number_or_name(&mut self, name: &str) -> Option<NumberOrName>;
     /// A point in the element's own coordinates.
     fn point(&mut self, name: &str) -> Option<glam::Vec3>;
+    /// A direction in the element's own coordinates, of any length.
+    fn vector(&mut self, name: &str) -> Option<glam::Vec3>;
     /// The element's `to_world` transform, identity where absent.
     fn to_world(&mut self) -> glam::Affine3A;
     /// Reports a fault of the named parameter (of the element as a whole where the name is absent).

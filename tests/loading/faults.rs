@@ -119,7 +119,7 @@ fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
             "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, disk, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
-        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, point"),
+        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, directional, point, spot"),
         (
             "<shape type='cube'><emitter type='aera'/></shape>",
             "2:35: unknown emitter \"aera\" (did you mean \"area\"?)",
@@ -262,6 +262,48 @@ fn emitters_belong_where_they_can_emit() {
         // The second of them is that of the rest of the scene.
         ("<emitter type='constant'/>", "3:29: the scene has more than one emitter that surrounds it"),
     ]);
+}
+
+#[test]
+fn lights_that_shine_nowhere_are_faults() {
+    assert_each(&[
+        (
+            "<emitter type='spot'>\n<float name='cutoff_angle' value='200'/></emitter>",
+            "3:35: cutoff_angle is 200; accepted are degrees above 0, up to 180",
+        ),
+        (
+            "<emitter type='spot'><float name='cutoff_angle' value='10'/>\n<float name='beam_width' value='11'/></emitter>",
+            "3:33: beam_width is 11; accepted are degrees above 0, up to 10",
+        ),
+        (
+            "<emitter type='directional'>\n<vector name='direction' value='0, 0, 0'/></emitter>",
+            "3:33: the light has no direction",
+        ),
+        (
+            "<emitter type='directional'><transform name='to_world'><rotate x='1' angle='90'/></transform>\n\
+             <vector name='direction' value='0, 1, 0'/></emitter>",
+            "3:33: give either direction or to_world, not both",
+        ),
+    ]);
+}
+
+#[test]
+fn facets_have_a_known_distribution_and_one_roughness() {
+    let of = |inner: &str, expected: &str| {
+        let bsdf = format!("<bsdf type='roughconductor'>\n{inner}</bsdf>");
+        assert_each(&[(&bsdf, expected)]);
+    };
+    of("<string name='distribution' value='phong'/>", "3:36: unknown distribution \"phong\"; known: beckmann, ggx");
+    of("<float name='alpha' value='-0.1'/>", "3:28: alpha is -0.1; a roughness is finite and not negative");
+    of("<float name='alpha_u' value='0.1'/>", "3:30: alpha_u and alpha_v are given together");
+    of(
+        "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/>",
+        "3:65: alpha_u and alpha_v differ; accepted are surfaces of equal roughness both ways",
+    );
+    of(
+        "<float name='alpha' value='0.1'/><float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.1'/>",
+        "3:28: give either alpha or alpha_u and alpha_v, not both",
+    );
 }
 
 #[test]

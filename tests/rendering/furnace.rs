@@ -87,6 +87,7 @@ fn bodies_that_absorb_nothing_vanish_in_a_uniform_world() {
         ("white-cube", cube(white)),
         ("mirror-ball", sphere("<bsdf type='conductor'/>")),
         ("glass-ball", sphere(glass)),
+        ("pane-ball", sphere("<bsdf type='thindielectric'/>")),
         ("glass-cube", cube(glass)),
         (
             "air-bubble",

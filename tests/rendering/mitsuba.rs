@@ -17,12 +17,17 @@ fn check(names: &[&str]) {
 
 #[test]
 fn materials_are_what_mitsuba_makes_of_them() {
-    check(&["gold", "glass", "twosided"]);
+    check(&["gold", "glass", "twosided", "pane", "plastics"]);
+}
+
+#[test]
+fn rough_materials_are_what_mitsuba_makes_of_them() {
+    check(&["rough-metal", "rough-glass"]);
 }
 
 #[test]
 fn lights_are_what_mitsuba_makes_of_them() {
-    check(&["point", "constant", "sphere-light", "disk-light"]);
+    check(&["point", "spots", "constant", "sphere-light", "disk-light"]);
 }
 
 #[test]

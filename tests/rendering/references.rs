@@ -27,15 +27,26 @@ fn methods() -> Vec<(&'static str, Settings)> {
     ]
 }
 
-/// All methods against the reference in `folder`. Tiles of a 64² picture are compared with those of the 256²
+/// All methods against the reference in `folder`. Tiles of a picture of fewer pixels are compared with those of the
 /// reference, which with a box filter is exact: both are means over the same part of the film. The brightness of `mlt`
 /// is by default that of its first pass, 100,000 samples whatever follows, so it cannot be as precise as others'.
 fn check(name: &str, scene: &Scene, folder: &Path, precision: f64) {
+    check_methods(&methods(), name, scene, folder, [16, 16], precision);
+}
+
+fn check_methods(
+    methods: &[(&str, Settings)],
+    name: &str,
+    scene: &Scene,
+    folder: &Path,
+    tiles: [u32; 2],
+    precision: f64,
+) {
     let expected = Expected::read(&folder.join("reference.exr"));
-    for (method, settings) in methods() {
+    for (method, settings) in methods {
         let name = format!("reference-{name}-{method}");
-        let precision = if method == "mlt" { 3.0 * precision } else { precision };
-        Agreement { name: &name, tiles: [16, 16], precision }.check(&runs(scene, &settings, RUNS), &expected);
+        let precision = if *method == "mlt" { 3.0 * precision } else { precision };
+        Agreement { name: &name, tiles, precision }.check(&runs(scene, settings, RUNS), &expected);
     }
 }
 
@@ -67,12 +78,40 @@ fn scenes_of_others() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
+/// The scene of that name at that size, with its folder; nothing where there are no scenes of others.
+fn scene_of_others(name: &str, [width, height]: [u32; 2]) -> Option<(Scene, PathBuf)> {
+    let Some(folder) = scenes_of_others().map(|folder| folder.join(name)) else {
+        println!("skipped: there is no folder of scenes of others; RELT_SCENES names one");
+        return None;
+    };
+    let [width, height] = [width, height].map(|extent| extent.to_string());
+    Some((load(&folder.join("scene.xml"), &[("resx", &width), ("resy", &height)]), folder))
+}
+
 #[test]
 fn a_scene_of_somebody_else_agrees_with_its_reference() {
-    let Some(folder) = scenes_of_others().map(|folder| folder.join("bitterli-cornell-box")) else {
-        println!("skipped: there is no folder of scenes of others; RELT_SCENES names one");
-        return;
-    };
-    let scene = load(&folder.join("scene.xml"), &[("resx", "64"), ("resy", "64")]);
-    check("bitterli-cornell-box", &scene, &folder, 0.005);
+    if let Some((scene, folder)) = scene_of_others("bitterli-cornell-box", [64, 64]) {
+        check("bitterli-cornell-box", &scene, &folder, 0.005);
+    }
+}
+
+/// Path tracing and replica exchange as they come.
+fn two_methods() -> [(&'static str, Settings); 2] {
+    [Method::Path, Method::ReplicaExchange].map(|method| (method.name(), settings(method, MUTATIONS, 0)))
+}
+
+/// Rough metal from nearly smooth to rough, spheres as lights from small to large.
+#[test]
+fn veachs_plates_agree_with_their_reference() {
+    if let Some((scene, folder)) = scene_of_others("veach-mis", [96, 54]) {
+        check_methods(&two_methods(), "veach-mis", &scene, &folder, [16, 9], 0.02);
+    }
+}
+
+/// A lamp in its shade, a glass egg, rough metal.
+#[test]
+fn veachs_room_agrees_with_its_reference() {
+    if let Some((scene, folder)) = scene_of_others("veach-bidir", [64, 64]) {
+        check_methods(&two_methods(), "veach-bidir", &scene, &folder, [16, 16], 0.04);
+    }
 }

@@ -112,6 +112,7 @@ const TAGS: &[Tag] = &[
     tag("rgb", Kind::Value, &["name", "value"], &[]),
     tag("spectrum", Kind::Value, &["name", "value"], &[]),
     tag("point", Kind::Value, &["name"], &["value", "x", "y", "z"]),
+    tag("vector", Kind::Value, &["name"], &["value", "x", "y", "z"]),
     tag("transform", Kind::Transform, &["name"], &[]),
     tag("translate", Kind::Step, &[], &["value", "x", "y", "z"]),
     tag("scale", Kind::Step, &[], &["value", "x", "y", "z"]),

@@ -165,6 +165,11 @@ impl Parameters for ElementParameters<'_> {
         values::xyz(child, None, self.faults).map(|point| point.as_vec3())
     }
 
+    fn vector(&mut self, name: &str) -> Option<Vec3> {
+        let child = self.value(name, &["vector"])?;
+        values::xyz(child, None, self.faults).map(|vector| vector.as_vec3())
+    }
+
     fn to_world(&mut self) -> Affine3A {
         let read = self.value("to_world", &["transform"]).and_then(|child| transforms::read(child, self.faults));
         read.unwrap_or(Affine3A::IDENTITY)

@@ -7,16 +7,20 @@
 //! To add one: a new file and one line in the registry below (and in [`read`], where files name it).
 
 mod constant;
+mod directional;
 mod disk;
 mod mesh;
 mod point;
 mod sphere;
+mod spot;
 
 pub use constant::Constant;
+pub use directional::Directional;
 pub use disk::Disk;
 pub use mesh::MeshLight;
 pub use point::Point;
 pub use sphere::Sphere;
+pub use spot::Spot;
 
 use glam::Vec3;
 
@@ -38,7 +42,7 @@ pub struct LightSample {
     pub tfar: f32,
     /// Radiance over density, per channel.
     pub weight: Rgb,
-    /// Density with respect to solid angle; infinite for points, which no other technique can hit.
+    /// Density with respect to solid angle; infinite for points and single directions, which no other technique can hit.
     pub pdf: f32,
 }
 
@@ -49,7 +53,7 @@ const SHORT_OF_LIGHT: f32 = 0.9999;
 trait Emit {
     /// Emitted power in W, up to the unit of the scene, per channel; `scene_radius` is that of a sphere around it.
     fn power(&self, scene_radius: f32) -> Rgb;
-    /// The largest radiance or intensity it can show, per channel.
+    /// The largest radiance, intensity or irradiance it can show, per channel.
     fn value(&self) -> Rgb;
     /// Samples a direction to it from the surface point `p` with geometric normal `ng`; `None` where the chosen place
     /// does not shine to `p`.
@@ -104,16 +108,18 @@ macro_rules! registry {
 }
 
 // meshes are in every profile; the others only where a scene has any
-registry! { Constant, Disk, Point, Sphere }
+registry! { Constant, Directional, Disk, Point, Sphere, Spot }
 
 /// Names that [`read`] knows, as scene files use them. (`area` is a property of shapes.)
-pub const KNOWN: &[&str] = &["constant", "point"];
+pub const KNOWN: &[&str] = &["constant", "directional", "point", "spot"];
 
 /// Reads the light of that name; `None` where the name is not [`KNOWN`].
 pub fn read(name: &str, parameters: &mut dyn Parameters) -> Option<Light> {
     match name {
         "constant" => Some(Light::Constant(Constant::read(parameters))),
+        "directional" => Some(Light::Directional(Directional::read(parameters))),
         "point" => Some(Light::Point(Point::read(parameters))),
+        "spot" => Some(Light::Spot(Spot::read(parameters))),
         _ => None,
     }
 }

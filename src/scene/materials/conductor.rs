@@ -5,13 +5,19 @@ use glam::Vec3;
 use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
-/// Perfect reflection weighted by the conductor's Fresnel reflectance.
+/// Perfect reflection weighted by the conductor's Fresnel reflectance. Parameters: those of [`Metal`].
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor {
+    metal: Metal,
+}
+
+/// What light meets at a conductor, smooth or rough.
 ///
 /// Parameters: either `material` (a name from `PRESETS`) or the complex refractive index `eta` + i `k`; with
 /// neither, or with the material `none` alone, a mirror that reflects everything, as in Mitsuba.
 /// `specular_reflectance` multiplies it, 0…1, default 1.
 #[derive(Clone, Copy, Debug)]
-pub struct Conductor {
+pub(super) struct Metal {
     eta: Rgb,
     k: Rgb,
     specular_reflectance: Rgb,
@@ -19,36 +25,17 @@ pub struct Conductor {
     perfect: bool,
 }
 
-impl Conductor {
-    fn reflectance(&self, cos_theta: f32) -> Rgb {
+impl Metal {
+    /// By channel, at cos θ ≥ 0.
+    #[inline(always)]
+    pub fn reflectance(&self, cos_theta: f32) -> Rgb {
         if self.perfect {
             return self.specular_reflectance;
         }
         self.specular_reflectance * fresnel::conductor(cos_theta, self.eta, self.k)
     }
-}
 
-impl Scatter for Conductor {
-    fn lobes(&self) -> Lobes {
-        Lobes { smooth: false, delta_reflection: true, delta_transmission: false }
-    }
-
-    #[inline(always)]
-    fn sample(&self, wo: Vec3, _u: [f32; 2], _choice: f32) -> Option<ScatterSample> {
-        (wo.z > 0.0).then(|| ScatterSample {
-            wi: Vec3::new(-wo.x, -wo.y, wo.z),
-            weight: self.reflectance(wo.z),
-            pdf: f32::INFINITY,
-            eta: 1.0,
-        })
-    }
-
-    #[inline(always)]
-    fn evaluate(&self, _wo: Vec3, _wi: Vec3) -> Evaluation {
-        Evaluation::ZERO
-    }
-
-    fn read(p: &mut dyn Parameters) -> Self {
+    pub fn read(p: &mut dyn Parameters) -> Metal {
         let specular_reflectance = p.reflectance("specular_reflectance", 1.0);
         let material = p.string("material").filter(|name| name != "none");
         let (eta, k) = (p.rgb("eta"), p.rgb("k"));
@@ -72,15 +59,43 @@ impl Scatter for Conductor {
             })
         });
         let (eta, k) = preset.unwrap_or((eta.unwrap_or(MIRROR.0), k.unwrap_or(MIRROR.1)));
-        Conductor { eta, k, specular_reflectance, perfect }
+        Metal { eta, k, specular_reflectance, perfect }
+    }
+}
+
+/// Gold, for examples.
+pub(super) fn gold() -> Metal {
+    let (eta, k) = preset("Au").expect("gold is in the table");
+    Metal { eta, k, specular_reflectance: Rgb::ONE, perfect: false }
+}
+
+impl Scatter for Conductor {
+    fn lobes(&self) -> Lobes {
+        Lobes { delta_reflection: true, ..Lobes::NONE }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, _u: [f32; 2], _choice: f32) -> Option<ScatterSample> {
+        (wo.z > 0.0).then(|| ScatterSample {
+            wi: Vec3::new(-wo.x, -wo.y, wo.z),
+            weight: self.metal.reflectance(wo.z),
+            pdf: f32::INFINITY,
+            eta: 1.0,
+        })
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, _wo: Vec3, _wi: Vec3) -> Evaluation {
+        Evaluation::ZERO
+    }
+
+    fn read(p: &mut dyn Parameters) -> Self {
+        Conductor { metal: Metal::read(p) }
     }
 
     fn examples() -> Vec<Self> {
-        let (eta, k) = preset("Au").expect("gold is in the table");
-        vec![
-            Conductor { eta, k, specular_reflectance: Rgb::ONE, perfect: false },
-            Conductor { eta: Rgb::ZERO, k: Rgb::ONE, specular_reflectance: Rgb::splat(0.9), perfect: true },
-        ]
+        let mirror = Metal { eta: Rgb::ZERO, k: Rgb::ONE, specular_reflectance: Rgb::splat(0.9), perfect: true };
+        [gold(), mirror].map(|metal| Conductor { metal }).to_vec()
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Dielectric {
 
 impl Scatter for Dielectric {
     fn lobes(&self) -> Lobes {
-        Lobes { smooth: false, delta_reflection: true, delta_transmission: true }
+        Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
     }
 
     #[inline(always)]
@@ -46,29 +46,8 @@ impl Scatter for Dielectric {
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
-        let mut index = |name: &str, default: &str| -> f32 {
-            let known = |n: &str| INDICES.iter().find(|(known, _)| *known == n).map(|(_, index)| *index);
-            let value = match p.number_or_name(name) {
-                None => return known(default).expect("defaults are in the table"),
-                Some(NumberOrName::Number(v)) => v,
-                Some(NumberOrName::Name(n)) => match known(&n) {
-                    Some(v) => v,
-                    None => {
-                        let names: Vec<&str> = INDICES.iter().map(|(n, _)| *n).collect();
-                        p.fault(name, format!("unknown medium \"{n}\"; known: {}", names.join(", ")));
-                        1.0
-                    }
-                },
-            };
-            if !value.is_finite() || value <= 0.0 {
-                p.fault(name, format!("{name} is {value}; a refractive index is finite and greater than 0"));
-                return 1.0;
-            }
-            value
-        };
-        let eta = index("int_ior", "bk7") / index("ext_ior", "air");
         Dielectric {
-            eta,
+            eta: relative_index(p, "bk7"),
             specular_reflectance: p.reflectance("specular_reflectance", 1.0),
             specular_transmittance: p.reflectance("specular_transmittance", 1.0),
         }
@@ -79,6 +58,31 @@ impl Scatter for Dielectric {
             .map(|eta| Dielectric { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE })
             .to_vec()
     }
+}
+
+/// Index inside over index outside, from `int_ior` (that of the medium `inside` where absent) and `ext_ior` (air).
+pub(super) fn relative_index(p: &mut dyn Parameters, inside: &str) -> f32 {
+    let mut index = |name: &str, default: &str| -> f32 {
+        let known = |n: &str| INDICES.iter().find(|(known, _)| *known == n).map(|(_, index)| *index);
+        let value = match p.number_or_name(name) {
+            None => return known(default).expect("defaults are in the table"),
+            Some(NumberOrName::Number(v)) => v,
+            Some(NumberOrName::Name(n)) => match known(&n) {
+                Some(v) => v,
+                None => {
+                    let names: Vec<&str> = INDICES.iter().map(|(n, _)| *n).collect();
+                    p.fault(name, format!("unknown medium \"{n}\"; known: {}", names.join(", ")));
+                    1.0
+                }
+            },
+        };
+        if !value.is_finite() || value <= 0.0 {
+            p.fault(name, format!("{name} is {value}; a refractive index is finite and greater than 0"));
+            return 1.0;
+        }
+        value
+    };
+    index("int_ior", inside) / index("ext_ior", "air")
 }
 
 /// Refractive indices at 589 nm by the names that Mitsuba's files use.

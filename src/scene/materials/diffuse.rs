@@ -17,7 +17,7 @@ pub struct Diffuse {
 
 impl Scatter for Diffuse {
     fn lobes(&self) -> Lobes {
-        Lobes { smooth: true, delta_reflection: false, delta_transmission: false }
+        Lobes { smooth: true, ..Lobes::NONE }
     }
 
     #[inline(always)]

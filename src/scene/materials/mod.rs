@@ -10,6 +10,11 @@ mod conductor;
 mod dielectric;
 mod diffuse;
 mod fresnel;
+mod microfacets;
+mod plastic;
+mod roughconductor;
+mod roughdielectric;
+mod thindielectric;
 
 #[cfg(test)]
 mod tests;
@@ -19,6 +24,10 @@ use glam::Vec3;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
+pub use plastic::Plastic;
+pub use roughconductor::RoughConductor;
+pub use roughdielectric::RoughDielectric;
+pub use thindielectric::ThinDielectric;
 
 use super::{Rgb, parameters::Parameters};
 
@@ -54,6 +63,8 @@ impl Evaluation {
 pub struct Lobes {
     /// A lobe with a finite density.
     pub smooth: bool,
+    /// Another one, of what goes through.
+    pub smooth_transmission: bool,
     /// Perfect reflection.
     pub delta_reflection: bool,
     /// Perfect refraction.
@@ -61,15 +72,21 @@ pub struct Lobes {
 }
 
 impl Lobes {
+    /// None at all.
+    pub const NONE: Lobes =
+        Lobes { smooth: false, smooth_transmission: false, delta_reflection: false, delta_transmission: false };
+
     /// Whether choosing among the lobes takes a primary dimension of its own.
     pub fn need_choice(self) -> bool {
-        u8::from(self.smooth) + u8::from(self.delta_reflection) + u8::from(self.delta_transmission) > 1
+        let lobes = [self.smooth, self.smooth_transmission, self.delta_reflection, self.delta_transmission];
+        lobes.into_iter().map(u8::from).sum::<u8>() > 1
     }
 
     /// The lobes there are, one short phrase each.
     pub fn in_words(self) -> Vec<&'static str> {
         let named = [
             (self.smooth, "smooth lobe"),
+            (self.smooth_transmission, "smooth transmission"),
             (self.delta_reflection, "perfect reflection"),
             (self.delta_transmission, "perfect refraction"),
         ];
@@ -78,7 +95,7 @@ impl Lobes {
 
     /// Whether light passes through.
     pub fn transmit(self) -> bool {
-        self.delta_transmission
+        self.smooth_transmission || self.delta_transmission
     }
 }
 
@@ -152,4 +169,8 @@ registry! {
     "conductor" => Conductor,
     "dielectric" => Dielectric,
     "diffuse" => Diffuse,
+    "plastic" => Plastic,
+    "roughconductor" => RoughConductor,
+    "roughdielectric" => RoughDielectric,
+    "thindielectric" => ThinDielectric,
 }

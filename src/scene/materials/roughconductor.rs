@@ -1,0 +1,60 @@
+//! A rough conductor: brushed or sand-blasted metal.
+
+use glam::Vec3;
+
+use super::conductor::{Metal, gold};
+use super::microfacets::{FacetShape, Microfacets};
+use super::{Evaluation, Lobes, Scatter, ScatterSample};
+use crate::scene::parameters::Parameters;
+
+/// Tiny mirrors of metal: f = F D G/(4 cos θₒ cos θᵢ), without the light that goes on between them.
+///
+/// Parameters: those of [`Conductor`](super::Conductor) and of [`Microfacets`].
+/// Source: Cook & Torrance 1982; Walter et al. 2007.
+#[derive(Clone, Copy, Debug)]
+pub struct RoughConductor {
+    metal: Metal,
+    facets: Microfacets,
+}
+
+impl Scatter for RoughConductor {
+    fn lobes(&self) -> Lobes {
+        Lobes { smooth: true, ..Lobes::NONE }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u: [f32; 2], _choice: f32) -> Option<ScatterSample> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let m = self.facets.sample_visible(wo, u);
+        let cos = wo.dot(m);
+        let wi = 2.0 * cos * m - wo;
+        if wi.z <= 0.0 || cos <= 0.0 {
+            return None;
+        }
+        let pdf = self.facets.visible_density(wo, m) / (4.0 * cos);
+        let weight = self.metal.reflectance(cos) * self.facets.masking(wi, m);
+        (pdf > 0.0).then_some(ScatterSample { wi, weight, pdf, eta: 1.0 })
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::ZERO;
+        }
+        let m = (wo + wi).normalize();
+        let pdf = self.facets.masking(wo, m) * self.facets.density(m) / (4.0 * wo.z);
+        Evaluation { value: self.metal.reflectance(wo.dot(m)) * (self.facets.masking(wi, m) * pdf), pdf }
+    }
+
+    fn read(p: &mut dyn Parameters) -> Self {
+        RoughConductor { metal: Metal::read(p), facets: Microfacets::read(p) }
+    }
+
+    fn examples() -> Vec<Self> {
+        [(FacetShape::Beckmann, 0.15), (FacetShape::Ggx, 0.3), (FacetShape::Beckmann, 0.9), (FacetShape::Ggx, 1.0)]
+            .map(|(shape, alpha)| RoughConductor { metal: gold(), facets: Microfacets { shape, alpha } })
+            .to_vec()
+    }
+}

@@ -1,0 +1,57 @@
+//! A pane of glass so thin that what goes through is not displaced.
+
+use glam::Vec3;
+
+use super::dielectric::relative_index;
+use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use crate::scene::{Rgb, parameters::Parameters};
+
+/// Reflects and lets through as two parallel smooth interfaces do together: with all reflections between them,
+/// R + T²R + T²R³ + … = 2R/(1 + R) is reflected, R = 1 − T the reflectance of one; the rest goes straight on.
+///
+/// Parameters: those of [`Dielectric`](super::Dielectric).
+/// Source: Born & Wolf, Principles of Optics, section 7.6, without interference.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinDielectric {
+    /// Index of the pane over that around it.
+    eta: f32,
+    specular_reflectance: Rgb,
+    specular_transmittance: Rgb,
+}
+
+impl Scatter for ThinDielectric {
+    fn lobes(&self) -> Lobes {
+        Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, _u: [f32; 2], choice: f32) -> Option<ScatterSample> {
+        let one = fresnel::dielectric(wo.z.abs(), self.eta).0;
+        let both = 2.0 * one / (1.0 + one);
+        let (wi, weight) = if choice < both {
+            (Vec3::new(-wo.x, -wo.y, wo.z), self.specular_reflectance)
+        } else {
+            (-wo, self.specular_transmittance)
+        };
+        Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta: 1.0 })
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, _wo: Vec3, _wi: Vec3) -> Evaluation {
+        Evaluation::ZERO
+    }
+
+    fn read(p: &mut dyn Parameters) -> Self {
+        ThinDielectric {
+            eta: relative_index(p, "bk7"),
+            specular_reflectance: p.reflectance("specular_reflectance", 1.0),
+            specular_transmittance: p.reflectance("specular_transmittance", 1.0),
+        }
+    }
+
+    fn examples() -> Vec<Self> {
+        [1.5, 1.0 / 1.33]
+            .map(|eta| ThinDielectric { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE })
+            .to_vec()
+    }
+}
