@@ -92,9 +92,9 @@ pub fn jobs(study: &Study, prepared: &[Prepared]) -> Vec<StudyJob> {
     let methods = study.methods.len();
     let mut jobs = Vec::new();
     for (turn, &seed) in study.seeds.iter().enumerate() {
-        for scene in 0..study.scenes.len() {
+        for (scene, prepared) in prepared.iter().enumerate() {
             for method in (0..methods).map(|i| (i + turn) % methods) {
-                jobs.push(StudyJob { scene, method, seed, id: id(study, &prepared[scene], scene, method, seed) });
+                jobs.push(StudyJob { scene, method, seed, id: id(study, prepared, scene, method, seed) });
             }
         }
     }
