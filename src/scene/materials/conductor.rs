@@ -5,17 +5,17 @@ use glam::Vec3;
 use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
-/// Perfect reflection weighted by the conductor's Fresnel reflectance. Parameters: those of [`Metal`].
+/// Perfect reflection weighted by the conductor's Fresnel reflectance.
+///
+/// Parameters: either `material` (a name from `PRESETS`) or the complex refractive index `eta` + i `k`; with
+/// neither, or with the material `none` alone, a mirror that reflects everything, as in Mitsuba.
+/// `specular_reflectance` multiplies it, 0…1, default 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Conductor {
     metal: Metal,
 }
 
-/// What light meets at a conductor, smooth or rough.
-///
-/// Parameters: either `material` (a name from `PRESETS`) or the complex refractive index `eta` + i `k`; with
-/// neither, or with the material `none` alone, a mirror that reflects everything, as in Mitsuba.
-/// `specular_reflectance` multiplies it, 0…1, default 1.
+/// What light meets at a conductor, smooth or rough; parameters as of [`Conductor`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Metal {
     eta: Rgb,

@@ -7,10 +7,7 @@ use crate::scene::parameters::Parameters;
 
 /// An isotropic distribution of microfacet normals m over the upper hemisphere, with separable masking by Smith.
 ///
-/// Parameters: `distribution`, `beckmann` (default) or `ggx`; `alpha`, the roughness, about the root mean square slope of
-/// the facets over √2, default 0.1, at least [`LEAST_ALPHA`] (below it is as good as smooth, and is taken as that).
-/// `alpha_u` and `alpha_v` in its place must be equal. `sample_visible` is read and of no account: it is about noise in
-/// other renderers, here visible normals are always what is sampled.
+/// Parameters as of [`RoughConductor`](super::RoughConductor).
 /// Source: Walter et al. 2007, "Microfacet models for refraction through rough surfaces"; visible normals: Heitz &
 /// d'Eon 2014.
 #[derive(Clone, Copy, Debug, PartialEq)]

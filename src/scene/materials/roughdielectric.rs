@@ -12,7 +12,8 @@ use crate::scene::{Rgb, parameters::Parameters};
 /// - reflected: f = F D G/(4 |cos θₒ cos θᵢ|);
 /// - refracted: f = (1 − F) D G |o·m i·m|/(|cos θₒ cos θᵢ| (o·m + η i·m)²), with η = nᵢ/nₒ and radiance in its medium.
 ///
-/// Parameters: those of [`Dielectric`](super::Dielectric) and of [`Microfacets`].
+/// Parameters: those of [`Dielectric`](super::Dielectric), and of facets those of
+/// [`RoughConductor`](super::RoughConductor).
 /// Source: Walter et al. 2007, equations 20 and 21 (there for importance, which is η² times as much).
 #[derive(Clone, Copy, Debug)]
 pub struct RoughDielectric {
