@@ -10,8 +10,8 @@ use crate::scene::parameters::Parameters;
 /// Tiny mirrors of metal: f = F D G/(4 cos θₒ cos θᵢ), without the light that goes on between them.
 ///
 /// Parameters: those of [`Conductor`](super::Conductor); `distribution`, `beckmann` (default) or `ggx`; and
-/// `alpha`, the roughness, about the root mean square slope of the facets times √2, default 0.1, at least 1e-4 (below, it
-/// is taken as that). `alpha_u` and `alpha_v` in its place must be equal. `sample_visible` is read and of no account: it
+/// `alpha`, the roughness (the root mean square slope of Beckmann's facets), default 0.1, at least 1e-4 (below, it is
+/// taken as that). `alpha_u` and `alpha_v` in its place must be equal. `sample_visible` is read and of no account: it
 /// is about noise in other renderers, here visible normals are always what is sampled.
 /// Source: Cook & Torrance 1982; Walter et al. 2007.
 #[derive(Clone, Copy, Debug)]
