@@ -130,7 +130,7 @@ impl Run {
             rng: Rng::new(self.settings.seed),
         };
         if is_smoke_test() {
-            return bencher.iter(|| work(render::engine(&stage, &self.settings, Some(SMOKE)).as_mut(), &stage, SMOKE));
+            return bencher.iter(|| whole(render::engine(&stage, &self.settings, Some(SMOKE)).as_mut(), &stage));
         }
         if self.engine.is_none() {
             self.engine = Some(self.begin(&stage, scene));
@@ -156,6 +156,13 @@ impl Run {
         let [width, height] = [scene.film.width, scene.film.height];
         println!("{width} × {height} pixels, {rays:.2} rays a mutation");
         engine
+    }
+}
+
+/// Goes through all that a limited run has left.
+fn whole(engine: &mut dyn Engine, stage: &Stage) {
+    while engine.sweeps_left() != Some(0) {
+        engine.advance(stage, u64::MAX, None);
     }
 }
 
