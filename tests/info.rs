@@ -32,7 +32,7 @@ fn diffuse_scenes_with_one_light_spend_no_dimension_on_choices() {
                 "bounces 5 to 15: 5 (direction 2, place on light 2, roulette 1), drawn in two blocks of four",
                 "left out: lens, choice of lobe, choice of light",
                 "left out: conductor, dielectric",
-                "area: 1 left out: point, constant",
+                "area: 1 left out: point or spot, directional, constant",
                 "kernel diffuse",
             ],
         );

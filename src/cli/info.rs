@@ -103,7 +103,7 @@ fn shapes(features: &Features) -> Vec<String> {
 fn lights(features: &Features) -> Vec<String> {
     used_and_left_out(&[
         (features.area_lights, "area"),
-        (features.point_lights, "point"),
+        (features.point_lights, "point or spot"),
         (features.directional_lights, "directional"),
         (features.infinite_lights, "constant"),
     ])
