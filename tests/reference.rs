@@ -119,7 +119,7 @@ fn interruptions_change_no_bit() {
     };
     let (code, text) = killed("-INT");
     assert_eq!(code, Some(130), "{text}");
-    assert!(text.contains("error: interrupted after ") && text.contains("the same command goes on"), "{text}");
+    assert!(text.contains("stopped: interrupted after ") && text.contains("the same command goes on"), "{text}");
     let stopped = Reference::read(&folder.path().join("r.exr")).unwrap();
     assert!(stopped.noise().unwrap().rel_mse > 1e-4, "what is there is written");
     let (code, _) = killed("-KILL");
