@@ -192,11 +192,11 @@ fn skies_need_a_picture_and_turn_only() {
         ),
         (
             file("bright.exr") + "<transform name='to_world'><scale x='2'/></transform>",
-            "2:66: to_world of an envmap turns it",
+            "2:68: to_world of an envmap turns it",
         ),
         (
             file("bright.exr") + "<float name='scale' value='-1'/>",
-            "2:93: scale is -1; it must be finite and not negative",
+            "2:95: scale is -1; it must be finite and not negative",
         ),
     ] {
         let found = found(&inner);

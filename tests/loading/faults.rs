@@ -112,14 +112,20 @@ fn other_versions_are_faults() {
 #[test]
 fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
     assert_each(&[
-        ("  <bsdf type='glas'/>", "2:15: unknown bsdf \"glas\"; known: blendbsdf, bumpmap, conductor, dielectric, diffuse,"),
+        (
+            "  <bsdf type='glas'/>",
+            "2:15: unknown bsdf \"glas\"; known: blendbsdf, bumpmap, conductor, dielectric, diffuse,",
+        ),
         ("<bsdf type='difuse'/>", "2:13: unknown bsdf \"difuse\" (did you mean \"diffuse\"?); known: "),
         (
             "<shape type='sphere '/>",
             "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, disk, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
-        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, directional, point, spot"),
+        (
+            "<emitter type='sun'/>",
+            "2:16: unknown emitter \"sun\"; known: area, constant, directional, envmap, point, spot",
+        ),
         (
             "<shape type='cube'><emitter type='aera'/></shape>",
             "2:35: unknown emitter \"aera\" (did you mean \"area\"?)",
