@@ -6,6 +6,7 @@
 //! To add one: a new file and one line in the registry below. The tests at the end of this folder iterate the
 //! registry, so a new member arrives tested.
 
+mod coat;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -14,6 +15,7 @@ mod microfacets;
 mod plastic;
 mod roughconductor;
 mod roughdielectric;
+mod roughplastic;
 mod thindielectric;
 
 #[cfg(test)]
@@ -27,6 +29,7 @@ pub use diffuse::Diffuse;
 pub use plastic::Plastic;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
+pub use roughplastic::RoughPlastic;
 pub use thindielectric::ThinDielectric;
 
 use super::{Rgb, parameters::Parameters};
@@ -65,6 +68,8 @@ pub struct Lobes {
     pub smooth: bool,
     /// Another one, of what goes through.
     pub smooth_transmission: bool,
+    /// Another one, of what is under a coat.
+    pub smooth_base: bool,
     /// Perfect reflection.
     pub delta_reflection: bool,
     /// Perfect refraction.
@@ -73,13 +78,17 @@ pub struct Lobes {
 
 impl Lobes {
     /// None at all.
-    pub const NONE: Lobes =
-        Lobes { smooth: false, smooth_transmission: false, delta_reflection: false, delta_transmission: false };
+    pub const NONE: Lobes = Lobes {
+        smooth: false,
+        smooth_transmission: false,
+        smooth_base: false,
+        delta_reflection: false,
+        delta_transmission: false,
+    };
 
     /// Whether choosing among the lobes takes a primary dimension of its own.
     pub fn need_choice(self) -> bool {
-        let lobes = [self.smooth, self.smooth_transmission, self.delta_reflection, self.delta_transmission];
-        lobes.into_iter().map(u8::from).sum::<u8>() > 1
+        self.in_words().len() > 1
     }
 
     /// The lobes there are, one short phrase each.
@@ -87,6 +96,7 @@ impl Lobes {
         let named = [
             (self.smooth, "smooth lobe"),
             (self.smooth_transmission, "smooth transmission"),
+            (self.smooth_base, "smooth base"),
             (self.delta_reflection, "perfect reflection"),
             (self.delta_transmission, "perfect refraction"),
         ];
@@ -107,6 +117,11 @@ pub trait Scatter: Copy {
     fn sample(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample>;
     /// Value and density of a given pair.
     fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation;
+    /// Whether it matters how the surface is turned about its normal: then the local frame's x axis is to lie along the
+    /// part of ∂p/∂u in the tangent plane.
+    fn needs_tangents(&self) -> bool {
+        false
+    }
     /// Reads itself from a scene element.
     fn read(parameters: &mut dyn Parameters) -> Self;
     /// Instances that the tests go through.
@@ -143,6 +158,11 @@ macro_rules! registry {
                 match self { $(Material::$material(m) => m.lobes()),+ }
             }
 
+            /// See [`Scatter::needs_tangents`].
+            pub fn needs_tangents(&self) -> bool {
+                match self { $(Material::$material(m) => m.needs_tangents()),+ }
+            }
+
             /// See [`Scatter::sample`].
             #[inline(always)]
             pub fn sample(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
@@ -172,5 +192,6 @@ registry! {
     "plastic" => Plastic,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
+    "roughplastic" => RoughPlastic,
     "thindielectric" => ThinDielectric,
 }

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::dielectric::relative_index;
+use super::dielectric::Interface;
 use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
-use crate::scene::{Rgb, parameters::Parameters};
+use crate::scene::parameters::Parameters;
 
 /// Reflects and lets through as two parallel smooth interfaces do together: with all reflections between them,
 /// R + T²R + T²R³ + … = 2R/(1 + R) is reflected, R = 1 − T the reflectance of one; the rest goes straight on.
@@ -13,10 +13,8 @@ use crate::scene::{Rgb, parameters::Parameters};
 /// Source: Born & Wolf, Principles of Optics, section 7.6, without interference.
 #[derive(Clone, Copy, Debug)]
 pub struct ThinDielectric {
-    /// Index of the pane over that around it.
-    eta: f32,
-    specular_reflectance: Rgb,
-    specular_transmittance: Rgb,
+    /// Of the pane (inside) and what is around it.
+    interface: Interface,
 }
 
 impl Scatter for ThinDielectric {
@@ -26,12 +24,12 @@ impl Scatter for ThinDielectric {
 
     #[inline(always)]
     fn sample(&self, wo: Vec3, _u: [f32; 2], choice: f32) -> Option<ScatterSample> {
-        let one = fresnel::dielectric(wo.z.abs(), self.eta).0;
+        let one = fresnel::dielectric(wo.z.abs(), self.interface.eta).0;
         let both = 2.0 * one / (1.0 + one);
         let (wi, weight) = if choice < both {
-            (Vec3::new(-wo.x, -wo.y, wo.z), self.specular_reflectance)
+            (Vec3::new(-wo.x, -wo.y, wo.z), self.interface.specular_reflectance)
         } else {
-            (-wo, self.specular_transmittance)
+            (-wo, self.interface.specular_transmittance)
         };
         Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta: 1.0 })
     }
@@ -42,16 +40,10 @@ impl Scatter for ThinDielectric {
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
-        ThinDielectric {
-            eta: relative_index(p, "bk7"),
-            specular_reflectance: p.reflectance("specular_reflectance", 1.0),
-            specular_transmittance: p.reflectance("specular_transmittance", 1.0),
-        }
+        ThinDielectric { interface: Interface::read(p) }
     }
 
     fn examples() -> Vec<Self> {
-        [1.5, 1.0 / 1.33]
-            .map(|eta| ThinDielectric { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE })
-            .to_vec()
+        [1.5, 1.0 / 1.33].map(|eta| ThinDielectric { interface: Interface::clear(eta) }).to_vec()
     }
 }
