@@ -32,7 +32,7 @@ fn scattering_functions_are_mitsubas_value_by_value() {
         .iter()
         .map(|shape| {
             let (Sides::One(index) | Sides::Two { front: index, .. }) = shape.sides;
-            (shape.name.as_str(), &scene.materials[index as usize])
+            (shape.name.as_str(), scene.appearances[index as usize].plain().expect("no texture"))
         })
         .collect();
     let mut table = csv::Reader::from_path(folder.join("scattering.csv")).expect("the table of Mitsuba's values");

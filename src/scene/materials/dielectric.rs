@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{
     Rgb,
     parameters::{NumberOrName, Parameters},
@@ -41,9 +41,28 @@ impl Interface {
             specular_transmittance: p.reflectance("specular_transmittance", 1.0),
         }
     }
+
+    /// As numbered by [`put`](Interface::put).
+    pub const VARYING: &'static [VaryingParameter] = &[
+        VaryingParameter::reflectance("specular_reflectance"),
+        VaryingParameter::reflectance("specular_transmittance"),
+    ];
+
+    /// Gives a parameter another value.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        *(if i == 0 { &mut self.specular_reflectance } else { &mut self.specular_transmittance }) = value;
+    }
 }
 
 impl Scatter for Dielectric {
+    const VARYING: &'static [VaryingParameter] = Interface::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.interface.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
     }

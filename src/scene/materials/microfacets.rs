@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::math::{sin_cos_turn, warp::INV_PI};
-use crate::scene::parameters::Parameters;
+use crate::scene::{Rgb, parameters::Parameters, textures::scalar};
 
 /// A distribution of microfacet normals m over the upper hemisphere, with separable masking by Smith. Two roughnesses
 /// along x and y are a surface of roughness 1 that was stretched by as much: with the slopes s = m.x/(m.z α_u) and
@@ -52,16 +52,31 @@ impl Microfacets {
             }
             Some(value)
         };
-        let [alpha, u, v] = ["alpha", "alpha_u", "alpha_v"].map(&mut roughness);
-        match (u, v) {
-            (None, None) => {}
-            _ if alpha.is_some() => p.fault("alpha", "give either alpha or alpha_u and alpha_v, not both".into()),
-            (Some(_), Some(_)) => {}
-            (Some(_), None) => p.fault("alpha_u", "alpha_u and alpha_v are given together".into()),
-            (None, Some(_)) => p.fault("alpha_v", "alpha_u and alpha_v are given together".into()),
+        let [alpha, u, v] = Self::ROUGHNESSES.map(&mut roughness);
+        let given = [("alpha", alpha), ("alpha_u", u), ("alpha_v", v)].map(|(name, a)| a.is_some() || p.varies(name));
+        match given {
+            [_, false, false] | [false, true, true] => {}
+            [true, ..] => p.fault("alpha", "give either alpha or alpha_u and alpha_v, not both".into()),
+            [_, true, false] => p.fault("alpha_u", "alpha_u and alpha_v are given together".into()),
+            [_, false, true] => p.fault("alpha_v", "alpha_u and alpha_v are given together".into()),
         }
         let [alpha_u, alpha_v] = [u, v].map(|own| alpha.or(own).unwrap_or(0.1).max(LEAST_ALPHA));
         Microfacets { shape, alpha_u, alpha_v }
+    }
+
+    /// The names of the roughness, both ways and either way, as numbered by [`put`](Microfacets::put).
+    pub const ROUGHNESSES: [&'static str; 3] = ["alpha", "alpha_u", "alpha_v"];
+
+    /// Gives a roughness the value of a texture.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        let alpha = scalar(value).max(LEAST_ALPHA);
+        if i != 2 {
+            self.alpha_u = alpha;
+        }
+        if i != 1 {
+            self.alpha_v = alpha;
+        }
     }
 
     /// The same roughness both ways.

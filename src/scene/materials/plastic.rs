@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::dielectric::relative_index;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::math::warp::{INV_PI, cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::scene::{Rgb, parameters::Parameters};
 
@@ -22,8 +22,8 @@ pub struct Plastic {
     layers: Layers,
 }
 
-/// What plastics are made of, smooth or rough; made so that another reflectance of the base, as a texture gives it at
-/// every hit, costs a few divisions.
+/// What plastics are made of, smooth or rough; made so that other reflectances, as textures give them at every hit, cost
+/// a few divisions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layers {
     /// Index of the coat over that of what is around.
@@ -32,6 +32,8 @@ pub(super) struct Layers {
     /// R, of the interface from inside for diffuse light.
     inside: f32,
     nonlinear: bool,
+    /// r.
+    diffuse_reflectance: Rgb,
     /// r/(1 − r R)/η², or r/(1 − R)/η².
     pub base: Rgb,
     /// Part of samples that go to the interface where it reflects half of the light.
@@ -49,21 +51,30 @@ impl Layers {
     }
 
     pub fn new(eta: f32, inside: f32, diffuse: Rgb, specular_reflectance: Rgb, nonlinear: bool) -> Layers {
-        let (base, share) = (Rgb::ZERO, 0.0);
-        Layers { eta, specular_reflectance, inside, nonlinear, base, share }.with_diffuse_reflectance(diffuse)
+        let kept = if nonlinear { diffuse * inside } else { Rgb::splat(inside) };
+        let (specular_part, diffuse_part) = (specular_reflectance.element_sum(), diffuse.element_sum());
+        let both = specular_part + diffuse_part;
+        Layers {
+            eta,
+            specular_reflectance,
+            inside,
+            nonlinear,
+            diffuse_reflectance: diffuse,
+            base: diffuse / ((1.0 - kept) * (eta * eta)),
+            share: if both > 0.0 { specular_part / both } else { 0.5 },
+        }
     }
 
-    /// The same over a base of that reflectance r.
-    #[inline(always)]
-    pub fn with_diffuse_reflectance(self, diffuse: Rgb) -> Layers {
-        let kept = if self.nonlinear { diffuse * self.inside } else { Rgb::splat(self.inside) };
-        let mean = |rgb: Rgb| rgb.element_sum() / 3.0;
-        let both = mean(diffuse) + mean(self.specular_reflectance);
-        Layers {
-            base: diffuse / ((1.0 - kept) * (self.eta * self.eta)),
-            share: if both > 0.0 { mean(self.specular_reflectance) / both } else { 0.5 },
-            ..self
-        }
+    /// As numbered by [`put`](Layers::put).
+    pub const VARYING: &'static [VaryingParameter] =
+        &[VaryingParameter::reflectance("diffuse_reflectance"), VaryingParameter::reflectance("specular_reflectance")];
+
+    /// Gives a parameter another value.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        let (diffuse, specular) =
+            if i == 0 { (value, self.specular_reflectance) } else { (self.diffuse_reflectance, value) };
+        *self = Layers::new(self.eta, self.inside, diffuse, specular, self.nonlinear);
     }
 
     /// The probability of sampling the interface where it reflects that part of the light.
@@ -104,6 +115,13 @@ fn diffuse_reflectance(eta: f32) -> f32 {
 }
 
 impl Scatter for Plastic {
+    const VARYING: &'static [VaryingParameter] = Layers::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.layers.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, delta_reflection: true, ..Lobes::NONE }
     }

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::conductor::{Metal, gold};
 use super::microfacets::{FacetShape, LEAST_ALPHA, Microfacets};
-use super::{Evaluation, Lobes, Scatter, ScatterSample};
-use crate::scene::parameters::Parameters;
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter};
+use crate::scene::{Rgb, parameters::Parameters};
 
 /// Tiny mirrors of metal: f = F D G/(4 cos θₒ cos θᵢ), without the light that goes on between them.
 ///
@@ -22,6 +22,21 @@ pub struct RoughConductor {
 }
 
 impl Scatter for RoughConductor {
+    const VARYING: &'static [VaryingParameter] = &[
+        Metal::VARYING,
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[0]),
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[1]),
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[2]),
+    ];
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        match i {
+            0 => self.metal.specular_reflectance = value,
+            _ => self.facets.put(i - 1, value),
+        }
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, ..Lobes::NONE }
     }

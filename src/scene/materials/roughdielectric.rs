@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::dielectric::Interface;
 use super::microfacets::{FacetShape, LEAST_ALPHA, Microfacets};
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
-use crate::scene::parameters::Parameters;
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
+use crate::scene::{Rgb, parameters::Parameters};
 
 /// Tiny smooth interfaces, of which those that are seen reflect or refract by their own Fresnel reflectance F:
 ///
@@ -22,6 +22,22 @@ pub struct RoughDielectric {
 }
 
 impl Scatter for RoughDielectric {
+    const VARYING: &'static [VaryingParameter] = &[
+        Interface::VARYING[0],
+        Interface::VARYING[1],
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[0]),
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[1]),
+        VaryingParameter::roughness(Microfacets::ROUGHNESSES[2]),
+    ];
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        match i {
+            0 | 1 => self.interface.put(i, value),
+            _ => self.facets.put(i - 2, value),
+        }
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, smooth_transmission: true, ..Lobes::NONE }
     }

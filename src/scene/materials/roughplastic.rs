@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::coat::Coat;
 use super::microfacets::{FacetShape, LEAST_ALPHA, Microfacets};
 use super::plastic::Layers;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::math::warp::{INV_PI, cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::scene::{Rgb, parameters::Parameters};
 
@@ -45,6 +45,13 @@ impl RoughPlastic {
 }
 
 impl Scatter for RoughPlastic {
+    const VARYING: &'static [VaryingParameter] = Layers::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.layers.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, smooth_base: true, ..Lobes::NONE }
     }

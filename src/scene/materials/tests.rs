@@ -154,6 +154,32 @@ fn what_absorbs_nothing_is_as_bright_as_what_is_around_it() {
     }
 }
 
+/// Whatever is read with one value and then given another is what is read with the other.
+#[test]
+fn parameters_put_in_place_are_as_if_read() {
+    let (wo, wi) = (Vec3::new(0.48, 0.36, 0.8), Vec3::new(-0.36, -0.48, 0.8));
+    for name in KNOWN {
+        for (i, parameter) in varying(name).iter().enumerate() {
+            let both_ways = |value: f32| match parameter.name {
+                "alpha_u" => vec![("alpha_u", value), ("alpha_v", 0.3)],
+                "alpha_v" => vec![("alpha_u", 0.3), ("alpha_v", value)],
+                _ => vec![(parameter.name, value)],
+            };
+            let of = |value| read(name, &mut Bag(both_ways(value))).expect("known");
+            let (mut put, expected) = (of(0.3), of(0.7));
+            put.put(i, Rgb::splat(0.7));
+            for wi in [wi, -wi] {
+                let (got, expected) = (put.evaluate(wo, wi), expected.evaluate(wo, wi));
+                assert_eq!((got.value, got.pdf), (expected.value, expected.pdf), "{name}: {}", parameter.name);
+            }
+            for [a, b, c] in randoms(100) {
+                let samples = [put, expected].map(|m| m.sample(wo, [a, b], c).map(|s| (s.wi, s.weight, s.pdf)));
+                assert_eq!(samples[0], samples[1], "{name}: {}", parameter.name);
+            }
+        }
+    }
+}
+
 /// Parameters that are numbers.
 struct Bag(Vec<(&'static str, f32)>);
 
@@ -184,6 +210,15 @@ impl Parameters for Bag {
     }
     fn to_world(&mut self) -> glam::Affine3A {
         glam::Affine3A::IDENTITY
+    }
+    fn to_uv(&mut self) -> glam::Affine2 {
+        glam::Affine2::IDENTITY
+    }
+    fn varies(&self, _name: &str) -> bool {
+        false
+    }
+    fn image(&mut self, _name: &str) -> Option<std::sync::Arc<crate::scene::textures::Image>> {
+        None
     }
     fn fault(&mut self, name: &str, message: String) {
         panic!("{name}: {message}");

@@ -3,8 +3,8 @@
 use glam::Vec3;
 
 use super::dielectric::Interface;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
-use crate::scene::parameters::Parameters;
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
+use crate::scene::{Rgb, parameters::Parameters};
 
 /// Reflects and lets through as two parallel smooth interfaces do together: with all reflections between them,
 /// R + T²R + T²R³ + … = 2R/(1 + R) is reflected, R = 1 − T the reflectance of one; the rest goes straight on.
@@ -18,6 +18,13 @@ pub struct ThinDielectric {
 }
 
 impl Scatter for ThinDielectric {
+    const VARYING: &'static [VaryingParameter] = Interface::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.interface.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
     }
