@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::description::{Integrator, SceneDescription, ShapeGeometry};
+use super::description::{Integrator, Projection, SceneDescription, ShapeGeometry};
 use super::lights::Light;
 
 /// What a scene uses. Dimensions, kernels and messages follow from it.
@@ -28,6 +28,8 @@ pub struct Features {
     pub shapes: ShapeCounts,
     /// Triangles of all meshes.
     pub triangles: usize,
+    /// The camera has a lens, which takes two primary dimensions.
+    pub lens: bool,
     /// Limits on path length.
     pub integrator: Integrator,
 }
@@ -77,6 +79,7 @@ impl Features {
             infinite_lights: count(|l| matches!(l, Light::Constant(_))),
             shapes,
             triangles,
+            lens: matches!(description.camera.projection, Projection::Perspective { lens: Some(_), .. }),
             integrator: description.integrator,
         }
     }
@@ -99,6 +102,9 @@ impl Features {
             if n > 0 {
                 words.push(format!("{n} {what}"));
             }
+        }
+        if self.lens {
+            words.push("lens".to_owned());
         }
         words.push(format!("{} kernel", self.kernel().name()));
         words

@@ -1,5 +1,6 @@
 //! Scene files become the descriptions they mean, and faulty ones say where and why.
 
+mod cameras;
 mod descriptions;
 mod faults;
 mod files;
