@@ -68,7 +68,7 @@ fn faults(text: &str, defines: &[(&str, &str)]) -> Vec<String> {
 
 /// A text, and what the faults in it begin with, in order and no others.
 #[track_caller]
-fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
+pub fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
     let found = faults(text, defines);
     let is_same = found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| f.starts_with(e));
     let text: String = text.chars().take(2000).collect();
@@ -379,7 +379,10 @@ fn films_of_no_size_are_faults() {
         ),
         ("<float name='width' value='10'/>", "3:1: \"width\" is given as <float>; accepted: <integer>"),
         ("<string name='file_format' value='png'/>", "3:35: unknown file_format \"png\"; known: exr, openexr"),
-        ("<rfilter type='lanczos'/>", "3:16: unknown rfilter \"lanczos\"; known: box, gaussian, tent"),
+        (
+            "<rfilter type='sinc'/>",
+            "3:16: unknown rfilter \"sinc\"; known: box, catmullrom, gaussian, lanczos, mitchell, tent",
+        ),
         ("<rfilter type='tent'><float name='radius' value='0'/></rfilter>", "3:50: radius is 0 pixels"),
         ("<rfilter type='gaussian'><float name='stddev' value='5'/></rfilter>", "3:54: stddev is 5 pixels"),
     ] {
