@@ -107,7 +107,7 @@ mod tests {
         rng::{Counter, Purpose, Rng, unit_f32},
         scene::{
             FullProfile, Mesh,
-            lights::{Constant, Disk, MeshLight, Sphere},
+            lights::{Constant, Cylinder, Disk, MeshLight, Sphere},
         },
     };
 
@@ -116,6 +116,8 @@ mod tests {
         let corners = vec![Vec3::new(-1.0, -1.0, 2.0), Vec3::new(1.0, -1.0, 2.0), Vec3::new(0.0, 1.0, 3.0)];
         vec![
             Light::Constant(Constant { radiance: Rgb::ONE }),
+            Light::Cylinder(Cylinder::new(Vec3::new(0.0, -0.6, -0.8), Vec3::new(0.0, 0.6, 0.8), 0.5, true, Rgb::ONE)),
+            Light::Cylinder(Cylinder::new(Vec3::new(-1.0, 1.0, 2.0), Vec3::new(2.0, 0.0, 1.0), 0.6, false, Rgb::ONE)),
             Light::Disk(Disk::new(Vec3::new(0.3, 0.0, 2.0), Vec3::new(0.6, 0.0, -0.8), 0.7, Rgb::ONE)),
             Light::MeshLight(MeshLight::new(Mesh::new(corners, vec![[0, 2, 1]]).into(), Rgb::ONE)),
             Light::Sphere(Sphere { center: Vec3::new(0.0, 1.0, 2.0), radius: 0.8, flipped: false, radiance: Rgb::ONE }),
@@ -136,8 +138,11 @@ mod tests {
         };
         let sphere = std::f64::consts::TAU * (1.0 - (1.0f64 - 0.64 / 5.0).sqrt());
         let full = 4.0 * std::f64::consts::PI;
+        // seen from the middle of a tube of half length 1 and radius ½: all but its two ends
+        let tube = full / 1.25f64.sqrt();
+        let exact = [Some(full), Some(tube), None, None, Some(triangle), Some(sphere), Some(full)];
         let rng = Rng::new(2);
-        for (light, solid_angle) in lights().iter().zip([Some(full), None, Some(triangle), Some(sphere), Some(full)]) {
+        for (light, solid_angle) in lights().iter().zip(exact) {
             let n = 1 << 16;
             let mut sum = 0.0;
             for step in 0..n {

@@ -24,9 +24,11 @@ pub struct Features {
     pub directional_lights: usize,
     /// Lights at infinity.
     pub infinite_lights: usize,
-    /// Triangle meshes, those with shading normals, spheres, disks.
+    /// Shapes of each kind, those of groups counted once.
     pub shapes: ShapeCounts,
-    /// Triangles of all meshes.
+    /// Places of groups of shapes.
+    pub instances: usize,
+    /// Triangles of all meshes, those of groups counted once.
     pub triangles: usize,
     /// Limits on path length.
     pub integrator: Integrator,
@@ -43,6 +45,15 @@ pub struct ShapeCounts {
     pub spheres: usize,
     /// Exact disks.
     pub disks: usize,
+    /// Exact cylinders.
+    pub cylinders: usize,
+}
+
+impl ShapeCounts {
+    /// Those that Embree asks us about.
+    pub fn quadrics(&self) -> usize {
+        self.spheres + self.disks + self.cylinders
+    }
 }
 
 impl Features {
@@ -55,7 +66,7 @@ impl Features {
         let lobes: Vec<_> = description.materials.iter().map(|m| m.lobes()).collect();
         let mut shapes = ShapeCounts::default();
         let mut triangles = 0;
-        for shape in &description.shapes {
+        for shape in description.all_shapes() {
             match &shape.geometry {
                 ShapeGeometry::Mesh(mesh) => {
                     triangles += mesh.triangles.len();
@@ -63,6 +74,7 @@ impl Features {
                 }
                 ShapeGeometry::Sphere { .. } => shapes.spheres += 1,
                 ShapeGeometry::Disk { .. } => shapes.disks += 1,
+                ShapeGeometry::Cylinder { .. } => shapes.cylinders += 1,
             }
         }
         let count = |is: fn(&Light) -> bool| description.lights.iter().filter(|l| is(l)).count();
@@ -76,6 +88,7 @@ impl Features {
             directional_lights: count(|l| matches!(l, Light::Directional(_))),
             infinite_lights: count(|l| matches!(l, Light::Constant(_))),
             shapes,
+            instances: description.instances.len(),
             triangles,
             integrator: description.integrator,
         }
@@ -91,6 +104,8 @@ impl Features {
             (shapes.smooth_meshes, "meshes with shading normals"),
             (shapes.spheres, "spheres"),
             (shapes.disks, "disks"),
+            (shapes.cylinders, "cylinders"),
+            (self.instances, "instances"),
             (self.area_lights, "area lights"),
             (self.point_lights, "point lights"),
             (self.directional_lights, "directional lights"),
@@ -127,6 +142,8 @@ impl Features {
             (self.shapes.smooth_meshes, "shading normals"),
             (self.shapes.spheres, "spheres"),
             (self.shapes.disks, "disks"),
+            (self.shapes.cylinders, "cylinders"),
+            (self.instances, "instances"),
             (self.point_lights, "point lights"),
             (self.directional_lights, "directional lights"),
             (self.infinite_lights, "lights at infinity"),
@@ -158,7 +175,7 @@ impl Kernel {
 pub trait Profile {
     /// All materials are diffuse.
     const DIFFUSE: bool;
-    /// All shapes are triangle meshes without shading normals, so are all lights.
+    /// All shapes are triangle meshes without shading normals, so are all lights, and there are no instances.
     const FLAT_MESHES: bool;
 }
 

@@ -3,3 +3,5 @@
 mod descriptions;
 mod faults;
 mod files;
+mod instances;
+mod memory;

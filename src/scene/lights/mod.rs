@@ -7,6 +7,7 @@
 //! To add one: a new file and one line in the registry below (and in [`read`], where files name it).
 
 mod constant;
+mod cylinder;
 mod directional;
 mod disk;
 mod mesh;
@@ -15,6 +16,7 @@ mod sphere;
 mod spot;
 
 pub use constant::Constant;
+pub use cylinder::Cylinder;
 pub use directional::Directional;
 pub use disk::Disk;
 pub use mesh::MeshLight;
@@ -108,7 +110,7 @@ macro_rules! registry {
 }
 
 // meshes are in every profile; the others only where a scene has any
-registry! { Constant, Directional, Disk, Point, Sphere, Spot }
+registry! { Constant, Cylinder, Directional, Disk, Point, Sphere, Spot }
 
 /// Names that [`read`] knows, as scene files use them. (`area` is a property of shapes.)
 pub const KNOWN: &[&str] = &["constant", "directional", "point", "spot"];
@@ -148,6 +150,9 @@ impl Light {
                 Light::Sphere(Sphere { center, radius, flipped, radiance })
             }
             &ShapeGeometry::Disk { center, normal, radius } => Light::Disk(Disk::new(center, normal, radius, radiance)),
+            &ShapeGeometry::Cylinder { start, end, radius, flipped } => {
+                Light::Cylinder(Cylinder::new(start, end, radius, flipped, radiance))
+            }
         })
     }
 }

@@ -29,5 +29,5 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
     let is_mirrored = to_world.matrix3.determinant() < 0.0;
     let normal = if is_mirrored != flip_normals { -upright } else { upright };
     let geometry = ShapeGeometry::Disk { center: to_world.translation.into(), normal, radius };
-    Some(Box::new(move || Ok(geometry.into())))
+    Some(Build::ready(geometry))
 }

@@ -36,5 +36,5 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
         // Mitsuba turns a mirrored sphere inside out, unlike rectangles, disks and cubes.
         flipped: flip_normals != (matrix.determinant() < 0.0),
     };
-    Some(Box::new(move || Ok(geometry.into())))
+    Some(Build::ready(geometry))
 }
