@@ -4,6 +4,7 @@
 //! a new module and a line in `FORMATS`.
 
 mod faults;
+mod images;
 mod mitsuba;
 mod watch;
 

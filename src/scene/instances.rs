@@ -6,6 +6,7 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 use super::SceneDescription;
 use super::description::GroupDescription;
+use super::parametrisation::Place;
 use crate::embree;
 
 /// All instances of a scene, ready for look-up by the number of their Embree geometry.
@@ -92,6 +93,12 @@ impl Instance {
         self.to_world.transform_point3(p)
     }
 
+    /// Tangents in the world; surface coordinates stay.
+    pub fn place_to_world(&self, place: &Place) -> Place {
+        let [du, dv] = [place.du, place.dv].map(|tangent| self.to_world.transform_vector3(tangent));
+        Place { uv: place.uv, du, dv }
+    }
+
     /// A unit normal in the world; where the front is stays the same even if the transform mirrors.
     #[inline(always)]
     pub fn normal_to_world(&self, n: Vec3) -> Vec3 {
@@ -113,7 +120,7 @@ impl Instance {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec3, Mat3};
 
     use super::*;
     use crate::math::{offset_origin, warp};
@@ -160,7 +167,7 @@ mod tests {
     /// A scene of shapes in the world and one group in one place.
     fn scene(world: Vec<ShapeGeometry>, group: Vec<ShapeGeometry>, to_world: Affine3A) -> Scene {
         let mut description = with_lights(Vec::new());
-        description.materials.push(Material::Diffuse(Diffuse { reflectance: Rgb::ONE }));
+        description.appearances.push(Material::Diffuse(Diffuse { reflectance: Rgb::ONE }).into());
         description.shapes = world.into_iter().map(shape).collect();
         let shapes: Vec<_> = group.into_iter().map(shape).collect();
         if !shapes.is_empty() {
@@ -236,11 +243,13 @@ mod tests {
     #[test]
     fn quadrics_in_groups_are_where_their_equations_put_them() {
         let mut random = Random(1 << 20);
-        let (start, end) = (Vec3::new(0.5, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.5));
+        let start = Vec3::new(0.5, -1.0, 0.0);
+        let axes = Mat3::from_euler(glam::EulerRot::XYZ, 0.3, -0.8, 1.4);
+        let sphere = Vec3::new(-1.0, 0.5, 0.2);
         let shapes = [
-            ShapeGeometry::Sphere { center: Vec3::new(-1.0, 0.5, 0.2), radius: 0.7, flipped: false },
-            ShapeGeometry::Disk { center: Vec3::new(0.0, 2.0, 0.0), normal: Vec3::Y, radius: 1.0 },
-            ShapeGeometry::Cylinder { start, end, radius: 0.4, flipped: true },
+            ShapeGeometry::Sphere { center: sphere, radius: 0.7, axes, flipped: false },
+            ShapeGeometry::Disk { center: Vec3::new(0.0, 2.0, 0.0), radius: 1.0, axes },
+            ShapeGeometry::Cylinder { start, length: 2.1, radius: 0.4, axes, flipped: true },
         ];
         for (which, shape) in shapes.into_iter().enumerate() {
             let mut hits = 0;
@@ -257,10 +266,10 @@ mod tests {
                         (to_group.transform_point3(found.p), to_world.matrix3.transpose() * Vec3A::from(found.ng));
                     let n = Vec3::from(n).normalize();
                     let (off, normal) = match which {
-                        0 => (q.distance(Vec3::new(-1.0, 0.5, 0.2)) - 0.7, q - Vec3::new(-1.0, 0.5, 0.2)),
-                        1 => (q.y - 2.0, Vec3::Y),
+                        0 => (q.distance(sphere) - 0.7, q - sphere),
+                        1 => ((q - Vec3::new(0.0, 2.0, 0.0)).dot(axes.z_axis), axes.z_axis),
                         _ => {
-                            let across = (q - start).reject_from(end - start);
+                            let across = (q - start).reject_from(axes.z_axis);
                             (across.length() - 0.4, -across)
                         }
                     };
@@ -288,7 +297,7 @@ mod tests {
             let to_world = Affine3A { matrix3, translation: Vec3A::from(random.direction()) - back };
             let size = 1.0 + 0.01 * far;
             let group = if round % 5 == 0 {
-                ShapeGeometry::Sphere { center: place, radius: size, flipped: false }
+                ShapeGeometry::Sphere { center: place, radius: size, axes: Mat3::IDENTITY, flipped: false }
             } else {
                 let corners = [0, 1, 2].map(|_| place + size * random.direction());
                 ShapeGeometry::Mesh(Mesh::new(corners.to_vec(), vec![[0, 1, 2]]).into())

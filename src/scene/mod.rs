@@ -2,6 +2,7 @@
 //!
 //! [`SceneDescription`] is what a file says; [`Scene`] is what rays travel through.
 
+pub mod appearance;
 mod camera;
 pub mod description;
 mod emitters;
@@ -11,12 +12,16 @@ pub mod lights;
 pub mod materials;
 pub mod mesh;
 pub mod parameters;
+mod parametrisation;
+pub mod relief;
 mod surface;
+pub mod textures;
 
+pub use appearance::Appearance;
 pub use camera::{Camera, Ray};
 pub use description::SceneDescription;
 pub use emitters::Emitters;
-pub use features::{DiffuseProfile, Features, FullProfile, Kernel, Profile};
+pub use features::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
 pub use surface::{NO_LIGHT, Surface};
 
@@ -25,6 +30,7 @@ use description::{FilmDescription, Integrator, ShapeDescription, ShapeGeometry, 
 use instances::Instances;
 use materials::Material;
 use surface::Shape;
+use textures::Varying;
 
 /// A colour or a radiometric quantity in linear RGB (Rec. 709 primaries), one `f32` a channel.
 pub type Rgb = glam::Vec3;
@@ -46,6 +52,8 @@ pub struct Scene {
     /// In the world first, then those of groups.
     shapes: Vec<Shape>,
     instances: Instances,
+    appearances: Vec<Appearance>,
+    /// The scattering function of each appearance that has a plain one (of others, that of their first part).
     materials: Vec<Material>,
 }
 
@@ -72,7 +80,8 @@ impl Scene {
         let radius = tracer.bounds().map_or(1.0, |(low, high)| 0.5 * (high - low).length());
         let (emitters, light_of_shape) = Emitters::new(&description, radius);
         let lights = light_of_shape.into_iter().chain(std::iter::repeat(None)); // shapes of groups do not emit
-        let shapes = description.all_shapes().zip(lights).map(|(shape, light)| surface_of(shape, light)).collect();
+        let surface = |(shape, light)| surface_of(shape, light, &description.appearances);
+        let shapes = description.all_shapes().zip(lights).map(surface).collect();
         Ok(Scene {
             integrator: description.integrator,
             film: description.film,
@@ -82,23 +91,31 @@ impl Scene {
             tracer,
             shapes,
             instances: Instances::new(&description),
-            materials: description.materials,
+            materials: description.appearances.iter().map(|a| a.parts()[0].material).collect(),
+            appearances: description.appearances,
         })
     }
 
-    /// All materials.
-    pub fn materials(&self) -> &[Material] {
-        &self.materials
+    /// All appearances.
+    pub fn appearances(&self) -> &[Appearance] {
+        &self.appearances
     }
 }
 
 /// The surface that a shape is.
-fn surface_of(shape: &ShapeDescription, light: Option<u32>) -> Shape {
-    let (materials, two_sided) = match shape.sides {
+fn surface_of(shape: &ShapeDescription, light: Option<u32>, all: &[Appearance]) -> Shape {
+    let (appearances, two_sided) = match shape.sides {
         Sides::One(m) => ([m, m], false),
         Sides::Two { front, back } => ([front, back], true),
     };
-    Shape { kind: surface::Kind::new(&shape.geometry), materials, two_sided, light: light.unwrap_or(NO_LIGHT) }
+    let depends = |m: u32| all[m as usize].plain().is_none() || all[m as usize].needs_tangents();
+    Shape {
+        kind: surface::Kind::new(&shape.geometry),
+        appearances,
+        two_sided,
+        light: light.unwrap_or(NO_LIGHT),
+        varies: shape.emission.as_ref().is_some_and(Varying::is_textured) || appearances.into_iter().any(depends),
+    }
 }
 
 /// What Embree is given.
@@ -106,8 +123,10 @@ fn geometries(shapes: &[ShapeDescription]) -> Vec<embree::Geometry> {
     let geometry = |shape: &ShapeDescription| match &shape.geometry {
         ShapeGeometry::Mesh(mesh) => embree::Geometry::Triangles(mesh.clone()),
         &ShapeGeometry::Sphere { center, radius, .. } => embree::Geometry::Sphere { center, radius },
-        &ShapeGeometry::Disk { center, normal, radius } => embree::Geometry::Disk { center, normal, radius },
-        &ShapeGeometry::Cylinder { start, end, radius, .. } => embree::Geometry::Cylinder { start, end, radius },
+        &ShapeGeometry::Disk { center, radius, axes } => embree::Geometry::Disk { center, normal: axes.z_axis, radius },
+        &ShapeGeometry::Cylinder { start, length, radius, axes, .. } => {
+            embree::Geometry::Cylinder { start, end: start + axes.z_axis * length, radius }
+        }
     };
     shapes.iter().map(geometry).collect()
 }

@@ -39,7 +39,7 @@ fn materials_are_shared_between_groups_and_the_world() {
         <shape type='shapegroup' id='g'><shape type='sphere'><ref id='gold'/></shape></shape>
         <shape type='sphere'><ref id='gold'/></shape><shape type='instance'><ref id='g'/></shape>",
     );
-    assert_eq!(scene.materials.len(), 1);
+    assert_eq!(scene.appearances.len(), 1);
     assert_eq!(scene.shapes[0].sides, scene.groups[0].shapes[0].sides);
 }
 

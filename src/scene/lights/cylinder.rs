@@ -2,33 +2,32 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{Mat3, Vec2, Vec3};
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
-    math::{Frame, sin_cos_turn},
-    scene::Rgb,
+    math::sin_cos_turn,
+    scene::{Rgb, parametrisation::cylinder_uv, textures::Varying},
 };
 
 /// A cylinder without caps that emits from its outside (from its inside, if flipped), uniform over its area.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cylinder {
-    start: Vec3,
-    /// Its normal is the axis.
-    frame: Frame,
-    length: f32,
-    radius: f32,
-    flipped: bool,
-    radiance: Rgb,
+    /// Where its axis begins.
+    pub start: Vec3,
+    /// Its length, > 0.
+    pub length: f32,
+    /// Radius, > 0.
+    pub radius: f32,
+    /// Its own axes, orthonormal, of which the third is that of the cylinder.
+    pub axes: Mat3,
+    /// The front is the inside.
+    pub flipped: bool,
+    /// Radiance, W/(m² sr) per channel.
+    pub radiance: Varying,
 }
 
 impl Cylinder {
-    /// The cylinder around the line from `start` to `end`, which are not the same.
-    pub fn new(start: Vec3, end: Vec3, radius: f32, flipped: bool, radiance: Rgb) -> Cylinder {
-        let (axis, length) = (end - start).normalize_and_length();
-        Cylinder { start, frame: Frame::new(axis), length, radius, flipped, radiance }
-    }
-
     fn area(&self) -> f32 {
         TAU * self.radius * self.length
     }
@@ -36,20 +35,26 @@ impl Cylinder {
 
 impl Emit for Cylinder {
     fn power(&self, _scene_radius: f32) -> Rgb {
-        self.radiance * (PI * self.area())
+        self.radiance.mean() * (PI * self.area())
     }
 
-    fn value(&self) -> Rgb {
-        self.radiance
+    fn largest(&self) -> f32 {
+        self.radiance.largest()
+    }
+
+    #[inline(always)]
+    fn radiance(&self, uv: Vec2) -> Rgb {
+        self.radiance.at(|| uv)
     }
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let (sin, cos) = sin_cos_turn(u[0]);
-        let outside = self.frame.s * cos + self.frame.t * sin;
-        let q = self.start + self.frame.n * (u[1] * self.length) + outside * self.radius;
+        let outside = self.axes.x_axis * cos + self.axes.y_axis * sin;
+        let from_start = self.axes.z_axis * (u[1] * self.length) + outside * self.radius;
         let front = if self.flipped { -outside } else { outside };
-        towards(p, ng, q, [front; 2], self.radiance, 1.0 / self.area())
+        let radiance = self.radiance.at(|| cylinder_uv(&self.axes, self.length, from_start));
+        towards(p, ng, self.start + from_start, [front; 2], radiance, 1.0 / self.area())
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::super::parameters::ElementParameters;
 use super::Build;
@@ -40,10 +40,16 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
         p.fault("radius", format!("radius is {radius} ({world_radius} in the world); it must be above 0"));
         return None;
     }
+    // straightened, since four digits leave axes askew
+    let (z, length) = along.normalize_and_length();
+    let length = length * p0.distance(p1);
+    let x = (x - z * z.dot(x)).normalize();
+    let y = z.cross(x) * z.cross(x).dot(y).signum();
     Some(Build::ready(ShapeGeometry::Cylinder {
         start: to_world.transform_point3(p0),
-        end: to_world.transform_point3(p1),
+        length,
         radius: world_radius,
-        flipped: flip_normals,
+        axes: Mat3::from_cols(x, y, z),
+        flipped: flip_normals, // its front stays outside even if mirrored, unlike that of spheres
     }))
 }

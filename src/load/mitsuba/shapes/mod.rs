@@ -24,12 +24,13 @@ use super::emitters;
 use super::ids::Ids;
 use super::parameters::ElementParameters;
 use super::registry::Registry;
+use super::textures::Textures;
 use crate::load::Watch;
 use crate::load::faults::{Faults, Span};
 use crate::load::watch::{self, Source};
-use crate::scene::Rgb;
 use crate::scene::description::{GroupDescription, InstanceDescription, ShapeDescription, ShapeGeometry, Sides};
 use crate::scene::parameters::Parameters;
+use crate::scene::textures::Varying;
 use mesh::{Placement, RawMesh, Repairs};
 
 /// What a `type` of shape is.
@@ -102,7 +103,7 @@ struct Pending {
     /// Where faults of the geometry are shown.
     span: Span,
     /// Sides and emission, unless one of them is faulty.
-    parts: Option<(Sides, Option<Rgb>)>,
+    parts: Option<(Sides, Option<Varying>)>,
     build: Build,
 }
 
@@ -124,11 +125,12 @@ pub fn read<'a>(
     folder: &Path,
     ids: &Ids<'a>,
     bsdfs: &mut Library<'a>,
+    textures: &'a Textures<'a>,
     watch: &Watch,
     faults: &'a Faults,
 ) -> Option<Shapes> {
     let layout = instances::layout(elements, ids, faults);
-    let mut read = |elements: &[&'a Element]| pending_all(elements, folder, bsdfs, faults);
+    let mut read = |elements: &[&'a Element]| pending_all(elements, folder, bsdfs, textures, faults);
     let mut pending = vec![read(elements)];
     pending.extend(layout.groups.iter().map(|group| read(&instances::members(group, faults))));
 
@@ -150,11 +152,12 @@ fn pending_all<'a>(
     elements: &[&'a Element],
     folder: &Path,
     bsdfs: &mut Library<'a>,
+    textures: &'a Textures<'a>,
     faults: &'a Faults,
 ) -> Vec<Option<Pending>> {
     let is_surface = |element: &Element| !matches!(element.value("type"), instances::GROUP | instances::INSTANCE);
     let surfaces = elements.iter().enumerate().filter(|(_, element)| is_surface(element));
-    surfaces.map(|(i, element)| pending(i, element, folder, bsdfs, faults)).collect()
+    surfaces.map(|(i, element)| pending(i, element, folder, bsdfs, textures, faults)).collect()
 }
 
 /// Builds the shapes of all lists together, in parallel, and keeps the lists. `None` where a shape is faulty.
@@ -193,6 +196,7 @@ fn pending<'a>(
     element: &'a Element,
     folder: &Path,
     bsdfs: &mut Library<'a>,
+    textures: &'a Textures<'a>,
     faults: &'a Faults,
 ) -> Option<Pending> {
     let mut p = ElementParameters::new(element, faults);
@@ -205,7 +209,7 @@ fn pending<'a>(
         faults.at(&surplus.span, "the shape has more than one <bsdf>");
     }
     let emitter = p.single("emitter");
-    let emission = emitter.map(|emitter| emitters::of_shape(emitter, faults));
+    let emission = emitter.map(|emitter| emitters::of_shape(emitter, textures, faults));
     let sides = match surface.first() {
         Some(surface) => bsdfs.sides(surface),
         None if emitter.is_some() => Some(bsdfs.bare_sides(Bare::Black)),
