@@ -33,12 +33,17 @@ fn textures_are_what_mitsuba_makes_of_them() {
 
 #[test]
 fn lights_are_what_mitsuba_makes_of_them() {
-    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light"]);
+    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light", "cylinder-light"]);
 }
 
 #[test]
 fn shapes_are_what_mitsuba_makes_of_them() {
-    check(&["smooth", "flipped"]);
+    check(&["smooth", "flipped", "cylinder", "serialized"]);
+}
+
+#[test]
+fn instances_are_what_mitsuba_makes_of_them() {
+    check(&["instances"]);
 }
 
 #[test]
