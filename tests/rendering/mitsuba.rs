@@ -26,6 +26,11 @@ fn rough_materials_are_what_mitsuba_makes_of_them() {
 }
 
 #[test]
+fn principled_materials_are_what_mitsuba_makes_of_them() {
+    check(&["principled", "principled-glass", "principled-varied"]);
+}
+
+#[test]
 fn lights_are_what_mitsuba_makes_of_them() {
     check(&["point", "spots", "constant", "sphere-light", "disk-light"]);
 }

@@ -252,6 +252,10 @@ impl Parameters for ElementParameters<'_> {
         }
     }
 
+    fn varies(&self, name: &str) -> bool {
+        self.textured.iter().any(|(slot, _)| self.varying[*slot].name == name)
+    }
+
     fn image(&mut self, name: &str) -> Option<Arc<Image>> {
         let file = self.required_string(name)?;
         let textures = self.textures.expect("elements that name pictures are read with them");

@@ -6,6 +6,7 @@
 //! To add one: a new file and one line in the registry below. The tests at the end of this folder iterate the
 //! registry, so a new member arrives tested.
 
+mod burley;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -13,6 +14,7 @@ mod fresnel;
 mod microfacets;
 mod null;
 mod plastic;
+mod principled;
 mod roughconductor;
 mod roughdielectric;
 mod thindielectric;
@@ -27,6 +29,7 @@ pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use null::Null;
 pub use plastic::Plastic;
+pub use principled::Principled;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
 pub use thindielectric::ThinDielectric;
@@ -67,6 +70,8 @@ pub struct Lobes {
     pub smooth: bool,
     /// Another one, of what goes through.
     pub smooth_transmission: bool,
+    /// Another one, of what is under a coat.
+    pub smooth_base: bool,
     /// Perfect reflection.
     pub delta_reflection: bool,
     /// Perfect refraction.
@@ -80,6 +85,7 @@ impl Lobes {
     pub const NONE: Lobes = Lobes {
         smooth: false,
         smooth_transmission: false,
+        smooth_base: false,
         delta_reflection: false,
         delta_transmission: false,
         straight: false,
@@ -87,9 +93,7 @@ impl Lobes {
 
     /// Whether choosing among the lobes takes a primary dimension of its own.
     pub fn need_choice(self) -> bool {
-        let Lobes { smooth, smooth_transmission, delta_reflection, delta_transmission, straight } = self;
-        let lobes = [smooth, smooth_transmission, delta_reflection, delta_transmission, straight];
-        lobes.into_iter().map(u8::from).sum::<u8>() > 1
+        self.in_words().len() > 1
     }
 
     /// Those of either.
@@ -97,6 +101,7 @@ impl Lobes {
         Lobes {
             smooth: self.smooth || other.smooth,
             smooth_transmission: self.smooth_transmission || other.smooth_transmission,
+            smooth_base: self.smooth_base || other.smooth_base,
             delta_reflection: self.delta_reflection || other.delta_reflection,
             delta_transmission: self.delta_transmission || other.delta_transmission,
             straight: self.straight || other.straight,
@@ -113,6 +118,7 @@ impl Lobes {
         let named = [
             (self.smooth, "smooth lobe"),
             (self.smooth_transmission, "smooth transmission"),
+            (self.smooth_base, "smooth base"),
             (self.delta_reflection, "perfect reflection"),
             (self.delta_transmission, "perfect refraction"),
             (self.straight, "straight passage"),
@@ -260,6 +266,7 @@ registry! {
     "diffuse" => Diffuse,
     "null" => Null,
     "plastic" => Plastic,
+    "principled" => Principled,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
     "thindielectric" => ThinDielectric,
