@@ -288,7 +288,7 @@ fn lights_that_shine_nowhere_are_faults() {
 }
 
 #[test]
-fn facets_have_a_known_distribution_and_one_roughness() {
+fn facets_have_a_known_distribution_and_roughnesses_that_make_sense() {
     let of = |inner: &str, expected: &str| {
         let bsdf = format!("<bsdf type='roughconductor'>\n{inner}</bsdf>");
         assert_each(&[(&bsdf, expected)]);
@@ -297,13 +297,13 @@ fn facets_have_a_known_distribution_and_one_roughness() {
     of("<float name='alpha' value='-0.1'/>", "3:28: alpha is -0.1; a roughness is finite and not negative");
     of("<float name='alpha_u' value='0.1'/>", "3:30: alpha_u and alpha_v are given together");
     of(
-        "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/>",
-        "3:65: alpha_u and alpha_v differ; accepted are surfaces of equal roughness both ways",
-    );
-    of(
         "<float name='alpha' value='0.1'/><float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.1'/>",
         "3:28: give either alpha or alpha_u and alpha_v, not both",
     );
+    assert_each(&[(
+        "<bsdf type='roughplastic'>\n<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/></bsdf>",
+        "3:65: alpha_u and alpha_v differ; a roughplastic has one roughness",
+    )]);
 }
 
 #[test]

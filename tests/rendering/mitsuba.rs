@@ -22,7 +22,7 @@ fn materials_are_what_mitsuba_makes_of_them() {
 
 #[test]
 fn rough_materials_are_what_mitsuba_makes_of_them() {
-    check(&["rough-metal", "rough-glass"]);
+    check(&["rough-metal", "rough-glass", "rough-plastics", "brushed-metal", "brushed-glass"]);
 }
 
 #[test]

@@ -7,7 +7,7 @@
 use glam::Vec3;
 
 use super::fresnel;
-use super::microfacets::{FacetShape, Microfacets, visible_hemisphere_normal};
+use super::microfacets::{FacetShape, Microfacets};
 use crate::math::{sin_cos_turn, warp::INV_PI};
 use crate::scene::{Rgb, textures::scalar};
 
@@ -106,58 +106,20 @@ impl Coat {
     #[inline(always)]
     pub fn value(&self, wo: Vec3, wi: Vec3, m: Vec3, eta: f32) -> f32 {
         const NORMAL_REFLECTANCE: f32 = 0.04;
-        const MASKS: Microfacets = Microfacets { shape: FacetShape::Ggx, alpha: 0.25 };
+        const MASKS: Microfacets = Microfacets { shape: FacetShape::Ggx, alpha_u: 0.25, alpha_v: 0.25 };
         let reflectance = NORMAL_REFLECTANCE + (1.0 - NORMAL_REFLECTANCE) * schlick_weight(wo.dot(m), eta);
         reflectance * self.density(m) * MASKS.masking(wo, m) * MASKS.masking(wi, m)
     }
 }
 
-/// GGX as of [`Microfacets`], of other roughness along x than along y.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ggx {
-    alpha: [f32; 2],
-}
-
-impl Ggx {
-    /// Of a roughness and an anisotropy in 0…1.
-    #[inline(always)]
-    pub fn new(roughness: f32, anisotropic: f32) -> Ggx {
-        const LEAST: f32 = 1e-3;
-        let (alpha, aspect) = (roughness * roughness, (1.0 - 0.9 * anisotropic).sqrt());
-        Ggx { alpha: [(alpha / aspect).max(LEAST), (alpha * aspect).max(LEAST)] }
-    }
-
-    #[inline(always)]
-    fn density(&self, m: Vec3) -> f32 {
-        if m.z <= 0.0 {
-            return 0.0;
-        }
-        let [u, v] = self.alpha;
-        let (x, y) = (m.x / u, m.y / v);
-        let spread = x * x + y * y + m.z * m.z;
-        INV_PI / (u * v * spread * spread)
-    }
-
-    #[inline(always)]
-    pub fn masking(&self, v: Vec3, m: Vec3) -> f32 {
-        if v.dot(m) * v.z * m.z <= 0.0 {
-            return 0.0;
-        }
-        let (x, y) = (self.alpha[0] * v.x, self.alpha[1] * v.y);
-        2.0 / (1.0 + (1.0 + (x * x + y * y) / (v.z * v.z)).sqrt())
-    }
-
-    #[inline(always)]
-    pub fn sample_visible(&self, v: Vec3, u: [f32; 2]) -> Vec3 {
-        let [x, y] = self.alpha;
-        let m = visible_hemisphere_normal(Vec3::new(x * v.x, y * v.y, v.z).normalize(), u);
-        Vec3::new(x * m.x, y * m.y, m.z.max(0.0)).normalize()
-    }
-
-    #[inline(always)]
-    pub fn visible_density(&self, v: Vec3, m: Vec3) -> f32 {
-        self.masking(v, m) * self.density(m) * (v.dot(m) / v.z).abs()
-    }
+/// GGX of a roughness and an anisotropy in 0…1: α = roughness², stretched along x and narrowed along y by
+/// 1/√(1 − 0.9 anisotropic). Source: Burley 2012, section 5.4.
+#[inline(always)]
+pub(super) fn facets(roughness: f32, anisotropic: f32) -> Microfacets {
+    const LEAST: f32 = 1e-3;
+    let (alpha, aspect) = (roughness * roughness, (1.0 - 0.9 * anisotropic).sqrt());
+    let [alpha_u, alpha_v] = [alpha / aspect, alpha * aspect].map(|alpha| alpha.max(LEAST));
+    Microfacets { shape: FacetShape::Ggx, alpha_u, alpha_v }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 //! registry, so a new member arrives tested.
 
 mod burley;
+mod coat;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -17,6 +18,7 @@ mod plastic;
 mod principled;
 mod roughconductor;
 mod roughdielectric;
+mod roughplastic;
 mod thindielectric;
 
 #[cfg(test)]
@@ -32,6 +34,7 @@ pub use plastic::Plastic;
 pub use principled::Principled;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
+pub use roughplastic::RoughPlastic;
 pub use thindielectric::ThinDielectric;
 
 use super::{Rgb, parameters::Parameters};
@@ -141,6 +144,23 @@ pub struct VaryingParameter {
     pub range: Range,
 }
 
+impl VaryingParameter {
+    /// A colour with channels within 0…1.
+    pub const fn reflectance(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Reflectance }
+    }
+
+    /// A number within 0…1.
+    pub const fn fraction(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Fraction }
+    }
+
+    /// A number that is not negative.
+    pub const fn roughness(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Roughness }
+    }
+}
+
 /// What values a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
@@ -223,11 +243,6 @@ macro_rules! registry {
                 match self { $(Material::$material(m) => m.put(parameter, value)),+ }
             }
 
-            /// See [`Scatter::needs_tangents`].
-            pub fn needs_tangents(&self) -> bool {
-                match self { $(Material::$material(m) => m.needs_tangents()),+ }
-            }
-
             /// The name of its kind.
             pub fn name(&self) -> &'static str {
                 match self { $(Material::$material(_) => $name),+ }
@@ -236,6 +251,11 @@ macro_rules! registry {
             /// Its lobes.
             pub fn lobes(&self) -> Lobes {
                 match self { $(Material::$material(m) => m.lobes()),+ }
+            }
+
+            /// See [`Scatter::needs_tangents`].
+            pub fn needs_tangents(&self) -> bool {
+                match self { $(Material::$material(m) => m.needs_tangents()),+ }
             }
 
             /// See [`Scatter::sample`].
@@ -269,5 +289,6 @@ registry! {
     "principled" => Principled,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
+    "roughplastic" => RoughPlastic,
     "thindielectric" => ThinDielectric,
 }

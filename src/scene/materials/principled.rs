@@ -4,7 +4,8 @@ mod parameters;
 
 use glam::Vec3;
 
-use super::burley::{self, Coat, Ggx};
+use super::burley::{self, Coat};
+use super::microfacets::Microfacets;
 use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::math::warp::{INV_PI, cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::scene::{Rgb, parameters::Parameters};
@@ -65,7 +66,7 @@ struct View {
     side: f32,
     /// Index beyond the surface over that on this side.
     eta: f32,
-    facets: Ggx,
+    facets: Microfacets,
     /// Parts of the samples that go to each lobe; they sum to 1.
     shares: Rates,
     /// Part of what facets do not reflect that they are sampled to refract.
@@ -194,7 +195,7 @@ impl Principled {
     /// The side that `wo` is on; `None` where there is nothing to be seen.
     #[inline(always)]
     fn seen_from(&self, wo: Vec3) -> Option<View> {
-        let facets = Ggx::new(self.roughness, self.anisotropic);
+        let facets = burley::facets(self.roughness, self.anisotropic);
         if wo.z > 0.0 {
             let refracts = self.transmitted();
             return Some(View { side: 1.0, eta: self.eta, facets, shares: self.shares(), refracts });

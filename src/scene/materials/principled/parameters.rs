@@ -1,27 +1,23 @@
 //! How principled materials are written down, and which of their parameters vary over a surface.
 
 use super::{Principled, Rates};
-use crate::scene::materials::{Range, VaryingParameter};
+use crate::scene::materials::VaryingParameter;
 use crate::scene::{Rgb, parameters::Parameters, textures::scalar};
 
 /// As numbered by [`Principled::put_at`].
 pub(super) const VARYING: &[VaryingParameter] = &[
-    VaryingParameter { name: "base_color", range: Range::Reflectance },
-    fraction("roughness"),
-    fraction("anisotropic"),
-    fraction("metallic"),
-    fraction("spec_trans"),
-    fraction("spec_tint"),
-    fraction("sheen"),
-    fraction("sheen_tint"),
-    fraction("flatness"),
-    fraction("clearcoat"),
-    fraction("clearcoat_gloss"),
+    VaryingParameter::reflectance("base_color"),
+    VaryingParameter::fraction("roughness"),
+    VaryingParameter::fraction("anisotropic"),
+    VaryingParameter::fraction("metallic"),
+    VaryingParameter::fraction("spec_trans"),
+    VaryingParameter::fraction("spec_tint"),
+    VaryingParameter::fraction("sheen"),
+    VaryingParameter::fraction("sheen_tint"),
+    VaryingParameter::fraction("flatness"),
+    VaryingParameter::fraction("clearcoat"),
+    VaryingParameter::fraction("clearcoat_gloss"),
 ];
-
-const fn fraction(name: &'static str) -> VaryingParameter {
-    VaryingParameter { name, range: Range::Fraction }
-}
 
 impl Principled {
     /// Gives a parameter another value, by its number in [`VARYING`].
