@@ -22,17 +22,18 @@ use crate::scene::{Rgb, parameters::Parameters};
 ///
 /// All but the facets are seen from the front alone; without t the material is black from behind.
 ///
-/// Parameters, 0…1: `base_color` (default 0.5), `roughness` (0.5; the facets' α is its square, at least 0.001),
-/// `anisotropic` (0; α is stretched by 1/√(1 − 0.9 anisotropic) along u and narrowed by as much along v), `metallic`,
-/// `spec_trans`, `spec_tint`, `sheen`, `sheen_tint`, `flatness`, `clearcoat`, `clearcoat_gloss` (0); either `eta` > 0,
-/// the index inside over that outside, or `specular` in 0…1 (0.5) for η = 2/(1 − √(0.08 specular)) − 1, of which what
-/// transmits has at least what tells the sides apart (η of 1 becomes 1.001, a specular of 0 becomes 0.001). How often
-/// lobes are sampled: `main_specular_sampling_rate` > 0, `diffuse_reflectance_sampling_rate` and
-/// `clearcoat_sampling_rate` ≥ 0, default 1.
+/// Parameters, 0…1, each a number or a texture: `base_color` (default 0.5), `roughness` (0.5; the facets' α is its
+/// square, at least 0.001), `anisotropic` (0; α is stretched by 1/√(1 − 0.9 anisotropic) along u and narrowed by as much
+/// along v), `metallic`, `spec_trans`, `spec_tint`, `sheen`, `sheen_tint`, `flatness`, `clearcoat`, `clearcoat_gloss`
+/// (0). Numbers: either `eta` > 0, the index inside over that outside, or `specular` in 0…1 (0.5) for
+/// η = 2/(1 − √(0.08 specular)) − 1, of which what transmits has at least what tells the sides apart (η of 1 becomes
+/// 1.001, a specular of 0 becomes 0.001). How often lobes are sampled: `main_specular_sampling_rate` > 0,
+/// `diffuse_reflectance_sampling_rate` and `clearcoat_sampling_rate` ≥ 0, default 1.
 ///
-/// This is Mitsuba's `principled`, value for value, with its habits: at η = 1 facets do not reflect, not even those of
-/// metal; energy is not conserved, as lobes add up without taking from each other: of white light a white base of roughness
-/// 1 returns 1.05 times as much as it gets head-on, 1.4 times at 84°.
+/// This is Mitsuba's `principled`, value for value and density for density, with its habits: at η = 1 facets do not
+/// reflect, not even those of metal; energy is not conserved, as lobes add up without taking from each other: of white
+/// light a white base of roughness 1 returns 1.05 times as much as it gets head-on, 1.4 times at 84°. One habit is left
+/// out: at spec_trans = 1 exactly Mitsuba's scalar variants drop the sheen, which is whole at 0.999 and here stays so.
 /// Sources: Burley 2012 and 2015, as in [`burley`]; Mitsuba 3.9's documentation and values.
 #[derive(Clone, Copy, Debug)]
 pub struct Principled {
@@ -165,6 +166,8 @@ impl Scatter for Principled {
             Principled { base_color: cloth, sheen: 0.5, sheen_tint: 0.5, flatness: 0.6, spec_tint: 0.7, ..plain },
             Principled { metallic: 0.4, spec_trans: 0.6, eta: 1.33, spec_tint: 0.5, anisotropic: 0.5, ..plain },
             Principled { eta: 1.0 / 1.5, clearcoat: 0.5, ..glass },
+            Principled { roughness: 0.0, clearcoat: 1.0, clearcoat_gloss: 1.0, ..metal },
+            Principled { roughness: 0.1, anisotropic: 1.0, ..glass },
             Principled { rates: Rates { base: 0.3, facets: 2.0, coat: 0.0 }, clearcoat: 0.5, metallic: 0.2, ..plain },
         ]
     }
