@@ -68,7 +68,7 @@ fn faults(text: &str, defines: &[(&str, &str)]) -> Vec<String> {
 
 /// A text, and what the faults in it begin with, in order and no others.
 #[track_caller]
-fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
+pub fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
     let found = faults(text, defines);
     let is_same = found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| f.starts_with(e));
     let text: String = text.chars().take(2000).collect();
@@ -112,14 +112,20 @@ fn other_versions_are_faults() {
 #[test]
 fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
     assert_each(&[
-        ("  <bsdf type='glas'/>", "2:15: unknown bsdf \"glas\"; known: conductor, dielectric, diffuse,"),
+        (
+            "  <bsdf type='glas'/>",
+            "2:15: unknown bsdf \"glas\"; known: blendbsdf, bumpmap, conductor, dielectric, diffuse,",
+        ),
         ("<bsdf type='difuse'/>", "2:13: unknown bsdf \"difuse\" (did you mean \"diffuse\"?); known: "),
         (
             "<shape type='sphere '/>",
             "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, disk, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
-        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, directional, point, spot"),
+        (
+            "<emitter type='sun'/>",
+            "2:16: unknown emitter \"sun\"; known: area, constant, directional, envmap, point, spot",
+        ),
         (
             "<shape type='cube'><emitter type='aera'/></shape>",
             "2:35: unknown emitter \"aera\" (did you mean \"area\"?)",
@@ -239,7 +245,14 @@ fn two_sided_surfaces_need_one_or_two_sides_that_do_not_transmit() {
             "<bsdf type='dielectric' id='glass'/><bsdf type='twosided'>\n<ref id='glass'/></bsdf>",
             "3:1: bsdf \"twosided\" cannot hold bsdf \"dielectric\", which transmits light",
         ),
-        ("<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>", "3:1: bsdf \"twosided\" cannot hold another one"),
+        (
+            "<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>",
+            "3:1: bsdf \"twosided\" refers to itself, if by detours",
+        ),
+        (
+            "<bsdf type='twosided'>\n<bsdf type='twosided'><bsdf type='diffuse'/></bsdf></bsdf>",
+            "3:1: bsdf \"twosided\" cannot hold another one",
+        ),
         (
             "<shape type='cube'><bsdf type='diffuse'/><bsdf type='diffuse'/></shape>",
             "2:42: the shape has more than one <bsdf>",
@@ -389,7 +402,10 @@ fn films_of_no_size_are_faults() {
         ),
         ("<float name='width' value='10'/>", "3:1: \"width\" is given as <float>; accepted: <integer>"),
         ("<string name='file_format' value='png'/>", "3:35: unknown file_format \"png\"; known: exr, openexr"),
-        ("<rfilter type='lanczos'/>", "3:16: unknown rfilter \"lanczos\"; known: box, gaussian, tent"),
+        (
+            "<rfilter type='sinc'/>",
+            "3:16: unknown rfilter \"sinc\"; known: box, catmullrom, gaussian, lanczos, mitchell, tent",
+        ),
         ("<rfilter type='tent'><float name='radius' value='0'/></rfilter>", "3:50: radius is 0 pixels"),
         ("<rfilter type='gaussian'><float name='stddev' value='5'/></rfilter>", "3:54: stddev is 5 pixels"),
     ] {

@@ -42,7 +42,12 @@ FILTERS = {
     "gaussian": {"type": "gaussian", "stddev": 0.8},
     "tent": {"type": "tent", "radius": 1.5},
     "everything": {"type": "gaussian"},
+    "crop": {"type": "gaussian", "stddev": 0.8},
+    "mitchell": {"type": "mitchell", "B": 0.2, "C": 0.6},
+    "catmullrom": {"type": "catmullrom"},
+    "lanczos": {"type": "lanczos"},
 }
+PIXELS = r'(name="(?:crop_)?(?:width|height|offset_[xy])" value=)"(\d+)"'
 SURFACE_ONLY = {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
 
 
@@ -50,7 +55,7 @@ def reference(name, samples):
     text = (HERE / f"{name}.xml").read_text()
     kernel = FILTERS.get(name)
     if kernel:
-        text = text.replace('value="24"', f'value="{24 * FINE}"').replace('value="16"', f'value="{16 * FINE}"')
+        text = re.sub(PIXELS, lambda found: f'{found[1]}"{int(found[2]) * FINE}"', text)
         text = re.sub(r'<rfilter type="\w+"(/>|>.*</rfilter>)', '<rfilter type="box"/>', text)
         samples //= FINE * FINE
     mi.file_resolver().append(str(HERE))

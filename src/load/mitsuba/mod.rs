@@ -30,6 +30,7 @@ use crate::scene::lights::Light;
 use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
+use sensors::View;
 use textures::Textures;
 
 /// Reads the text of the scene file at `path`.
@@ -59,7 +60,7 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     let shape_elements = p.nested(&["shape"]);
     let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, &textures, faults);
     for element in p.nested(&["bsdf"]) {
-        bsdfs.bsdf(element); // those that no shape uses have faults as well
+        bsdfs.bsdf(element, element); // those that no shape uses have faults as well
     }
     for element in p.nested(&["texture"]) {
         textures.get(element);
@@ -72,8 +73,9 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     }
     p.finish();
 
-    let (camera, film) = view?;
-    let (shapes, warnings) = shapes?;
+    let View { camera, film, mut warnings } = view?;
+    let (shapes, of_shapes) = shapes?;
+    warnings.extend(of_shapes);
     Some(SceneDescription {
         integrator: integrator?,
         camera,
