@@ -333,6 +333,29 @@ fn facets_have_a_known_distribution_and_roughnesses_that_make_sense() {
 }
 
 #[test]
+fn parameters_of_principled_materials_have_ranges() {
+    let of = |inner: &str, expected: &str| {
+        let bsdf = format!("<bsdf type='principled'>\n{inner}</bsdf>");
+        assert_each(&[(&bsdf, expected)]);
+    };
+    of("<float name='sheen' value='1.5'/>", "3:28: sheen is 1.5; accepted are numbers from 0 to 1");
+    of("<float name='eta' value='0'/>", "3:26: eta is 0; a ratio of refractive indices is finite and greater than 0");
+    of(
+        "<float name='eta' value='1.5'/><float name='specular' value='0.5'/>",
+        "3:62: give either eta or specular, not both",
+    );
+    of(
+        "<float name='main_specular_sampling_rate' value='0'/>",
+        "3:50: main_specular_sampling_rate is 0; a rate of sampling is finite and greater than 0",
+    );
+    of(
+        "<float name='clearcoat_sampling_rate' value='-1'/>",
+        "3:46: clearcoat_sampling_rate is -1; a rate of sampling is finite and not negative",
+    );
+    of("<float name='diff_trans' value='1'/>", "3:14: unknown parameter \"diff_trans\" of bsdf \"principled\"");
+}
+
+#[test]
 fn scenes_without_camera_or_light_are_faults() {
     let scene = |inner: &str| format!("<scene version='3.0.0'>\n{inner}</scene>");
     assert_faults(&scene("<emitter type='constant'/>"), &[], &["1:1: the scene has no <sensor>"]);

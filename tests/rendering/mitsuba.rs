@@ -27,6 +27,11 @@ fn rough_materials_are_what_mitsuba_makes_of_them() {
 }
 
 #[test]
+fn principled_materials_are_what_mitsuba_makes_of_them() {
+    check(&["principled", "principled-glass", "principled-varied"]);
+}
+
+#[test]
 fn textures_are_what_mitsuba_makes_of_them() {
     check(&["textures", "relief", "picture-lights"]);
 }
