@@ -19,7 +19,7 @@ fn allowed(shape: &str) -> (f64, f64) {
         "rough-plastic-inverted" => (8e-3, 4e-3),
         coated if coated.contains("plastic") => (3e-3, 1e-3),
         principled if principled.starts_with("principled") => (1e-4, 1e-4),
-        _ => (1e-3, 1e-3),
+        _ => (1e-5, 1e-5),
     }
 }
 
