@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::Appearance;
-use super::description::{Integrator, SceneDescription, ShapeGeometry};
+use super::description::{Integrator, Projection, SceneDescription, ShapeGeometry};
 use super::lights::Light;
 use super::materials::Lobes;
 use super::textures::Varying;
@@ -34,6 +34,8 @@ pub struct Features {
     pub instances: usize,
     /// Triangles of all meshes, those of groups counted once.
     pub triangles: usize,
+    /// The camera has a lens, which takes two primary dimensions.
+    pub lens: bool,
     /// Textures of materials, weights, reliefs and lights.
     pub textures: usize,
     /// Surfaces' sides that mix several materials.
@@ -110,6 +112,7 @@ impl Features {
             shapes,
             instances: description.instances.len(),
             triangles,
+            lens: matches!(description.camera.projection, Projection::Perspective { lens: Some(_), .. }),
             textures: textures.len(),
             mixtures: appearances.iter().filter(|a| a.parts().len() > 1).count(),
             reliefs: parts().filter(|part| part.relief.is_some()).count(),
@@ -141,6 +144,9 @@ impl Features {
             if n > 0 {
                 words.push(format!("{n} {what}"));
             }
+        }
+        if self.lens {
+            words.push("lens".to_owned());
         }
         words.push(format!("{} kernel", self.kernel().name()));
         words

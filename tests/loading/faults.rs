@@ -81,7 +81,7 @@ fn faults(text: &str, defines: &[(&str, &str)]) -> Vec<String> {
 
 /// A text, and what the faults in it begin with, in order and no others.
 #[track_caller]
-fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
+pub fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
     let found = faults(text, defines);
     let is_same = found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| f.starts_with(e));
     let text: String = text.chars().take(2000).collect();
@@ -125,14 +125,20 @@ fn other_versions_are_faults() {
 #[test]
 fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
     assert_each(&[
-        ("  <bsdf type='glas'/>", "2:15: unknown bsdf \"glas\"; known: conductor, dielectric, diffuse,"),
+        (
+            "  <bsdf type='glas'/>",
+            "2:15: unknown bsdf \"glas\"; known: blendbsdf, bumpmap, conductor, dielectric, diffuse,",
+        ),
         ("<bsdf type='difuse'/>", "2:13: unknown bsdf \"difuse\" (did you mean \"diffuse\"?); known: "),
         (
             "<shape type='sphere '/>",
             "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, cylinder, disk, instance, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
-        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, directional, point, spot"),
+        (
+            "<emitter type='sun'/>",
+            "2:16: unknown emitter \"sun\"; known: area, constant, directional, envmap, point, spot",
+        ),
         (
             "<shape type='cube'><emitter type='aera'/></shape>",
             "2:35: unknown emitter \"aera\" (did you mean \"area\"?)",
@@ -252,7 +258,14 @@ fn two_sided_surfaces_need_one_or_two_sides_that_do_not_transmit() {
             "<bsdf type='dielectric' id='glass'/><bsdf type='twosided'>\n<ref id='glass'/></bsdf>",
             "3:1: bsdf \"twosided\" cannot hold bsdf \"dielectric\", which transmits light",
         ),
-        ("<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>", "3:1: bsdf \"twosided\" cannot hold another one"),
+        (
+            "<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>",
+            "3:1: bsdf \"twosided\" refers to itself, if by detours",
+        ),
+        (
+            "<bsdf type='twosided'>\n<bsdf type='twosided'><bsdf type='diffuse'/></bsdf></bsdf>",
+            "3:1: bsdf \"twosided\" cannot hold another one",
+        ),
         (
             "<shape type='cube'><bsdf type='diffuse'/><bsdf type='diffuse'/></shape>",
             "2:42: the shape has more than one <bsdf>",
@@ -301,7 +314,7 @@ fn lights_that_shine_nowhere_are_faults() {
 }
 
 #[test]
-fn facets_have_a_known_distribution_and_one_roughness() {
+fn facets_have_a_known_distribution_and_roughnesses_that_make_sense() {
     let of = |inner: &str, expected: &str| {
         let bsdf = format!("<bsdf type='roughconductor'>\n{inner}</bsdf>");
         assert_each(&[(&bsdf, expected)]);
@@ -310,13 +323,36 @@ fn facets_have_a_known_distribution_and_one_roughness() {
     of("<float name='alpha' value='-0.1'/>", "3:28: alpha is -0.1; a roughness is finite and not negative");
     of("<float name='alpha_u' value='0.1'/>", "3:30: alpha_u and alpha_v are given together");
     of(
-        "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/>",
-        "3:65: alpha_u and alpha_v differ; accepted are surfaces of equal roughness both ways",
-    );
-    of(
         "<float name='alpha' value='0.1'/><float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.1'/>",
         "3:28: give either alpha or alpha_u and alpha_v, not both",
     );
+    assert_each(&[(
+        "<bsdf type='roughplastic'>\n<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/></bsdf>",
+        "3:65: alpha_u and alpha_v differ; a roughplastic has one roughness",
+    )]);
+}
+
+#[test]
+fn parameters_of_principled_materials_have_ranges() {
+    let of = |inner: &str, expected: &str| {
+        let bsdf = format!("<bsdf type='principled'>\n{inner}</bsdf>");
+        assert_each(&[(&bsdf, expected)]);
+    };
+    of("<float name='sheen' value='1.5'/>", "3:28: sheen is 1.5; accepted are numbers from 0 to 1");
+    of("<float name='eta' value='0'/>", "3:26: eta is 0; a ratio of refractive indices is finite and greater than 0");
+    of(
+        "<float name='eta' value='1.5'/><float name='specular' value='0.5'/>",
+        "3:62: give either eta or specular, not both",
+    );
+    of(
+        "<float name='main_specular_sampling_rate' value='0'/>",
+        "3:50: main_specular_sampling_rate is 0; a rate of sampling is finite and greater than 0",
+    );
+    of(
+        "<float name='clearcoat_sampling_rate' value='-1'/>",
+        "3:46: clearcoat_sampling_rate is -1; a rate of sampling is finite and not negative",
+    );
+    of("<float name='diff_trans' value='1'/>", "3:14: unknown parameter \"diff_trans\" of bsdf \"principled\"");
 }
 
 #[test]
@@ -379,7 +415,10 @@ fn films_of_no_size_are_faults() {
         ),
         ("<float name='width' value='10'/>", "3:1: \"width\" is given as <float>; accepted: <integer>"),
         ("<string name='file_format' value='png'/>", "3:35: unknown file_format \"png\"; known: exr, openexr"),
-        ("<rfilter type='lanczos'/>", "3:16: unknown rfilter \"lanczos\"; known: box, gaussian, tent"),
+        (
+            "<rfilter type='sinc'/>",
+            "3:16: unknown rfilter \"sinc\"; known: box, catmullrom, gaussian, lanczos, mitchell, tent",
+        ),
         ("<rfilter type='tent'><float name='radius' value='0'/></rfilter>", "3:50: radius is 0 pixels"),
         ("<rfilter type='gaussian'><float name='stddev' value='5'/></rfilter>", "3:54: stddev is 5 pixels"),
     ] {

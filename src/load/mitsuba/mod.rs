@@ -30,6 +30,7 @@ use crate::scene::lights::Light;
 use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
+use sensors::View;
 use textures::Textures;
 
 /// Reads the text of the scene file at `path`.
@@ -65,7 +66,7 @@ fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> O
     let shape_elements = p.nested(&["shape"]);
     let shapes = shapes::read(&shape_elements, folder, &ids, &mut bsdfs, &textures, watch, faults);
     for element in p.nested(&["bsdf"]) {
-        bsdfs.bsdf(element); // those that no shape uses have faults as well
+        bsdfs.bsdf(element, element); // those that no shape uses have faults as well
     }
     for element in p.nested(&["texture"]) {
         textures.get(element);
@@ -78,8 +79,9 @@ fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> O
     }
     p.finish();
 
-    let (camera, film) = view?;
+    let View { camera, film, mut warnings } = view?;
     let shapes = shapes?;
+    warnings.extend(shapes.warnings);
     Some(SceneDescription {
         integrator: integrator?,
         camera,
@@ -89,7 +91,7 @@ fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> O
         groups: shapes.groups,
         instances: shapes.instances,
         lights,
-        warnings: shapes.warnings,
+        warnings,
     })
 }
 
