@@ -368,8 +368,8 @@ fn cylinders_are_hit_from_both_sides_between_their_ends() {
         let (start, radius) = (10.0 * random.cube() - 5.0, (4.0 * random.unit() - 3.0).exp());
         let along = if round % 4 == 0 { Vec3::Y } else { random.direction() };
         let length = (4.0 * random.unit() - 3.0).exp();
-        let scene = Scene::new(&device(), vec![Geometry::Cylinder { start, end: start + length * along, radius }]);
-        let scene = scene.unwrap();
+        let end = start + length * along;
+        let scene = Scene::new(&device(), vec![Geometry::Cylinder { start, end, radius }]).unwrap();
         for _ in 0..50 {
             // from anywhere near to a point of the wall, or of its continuation beyond the ends
             let height = length * (2.0 * random.unit() - 0.5);
@@ -378,10 +378,10 @@ fn cylinders_are_hit_from_both_sides_between_their_ends() {
             let origin = target + (radius + length) * (0.1 + random.unit()) * random.direction();
             let direction = (target - origin) * (0.5 + random.unit());
             let hit = scene.closest_one(origin, direction, f32::INFINITY);
-            let [expected, margin] =
-                cylinder_oracle([start, along, origin, direction].map(Vec3::as_dvec3), length, radius);
+            let ray = [origin, direction].map(Vec3::as_dvec3);
+            let [expected, margin] = cylinder_oracle([start, end].map(Vec3::as_dvec3), radius.into(), ray);
             let agrees = match hit {
-                Some(hit) => (f64::from(hit.t) - expected).abs() < 1e-5 * expected && (hit.u, hit.v) == (0.0, 0.0),
+                Some(hit) => (f64::from(hit.t) - expected).abs() < 1e-6 * expected && (hit.u, hit.v) == (0.0, 0.0),
                 None => expected.is_infinite(),
             };
             let context =
@@ -397,10 +397,9 @@ fn cylinders_are_hit_from_both_sides_between_their_ends() {
 
 /// The t at which a ray meets a cylinder, or infinity, by a search for changes of sign of the distance to the wall; and how
 /// near it comes to an end or to grazing the wall, relative to the size of the cylinder.
-fn cylinder_oracle([start, axis, origin, direction]: [DVec3; 4], length: f32, radius: f32) -> [f64; 2] {
+fn cylinder_oracle([start, end]: [DVec3; 2], radius: f64, [origin, direction]: [DVec3; 2]) -> [f64; 2] {
     const STEPS: usize = 4000;
-    let (length, radius) = (f64::from(length), f64::from(radius));
-    let axis = axis.normalize();
+    let (axis, length) = (end - start).normalize_and_length();
     let at = |t: f64| {
         let p = origin + t * direction - start;
         let height = p.dot(axis);
@@ -492,10 +491,12 @@ fn an_instance_is_hit_where_the_transformed_shapes_are() {
                     assert!(near && same_place, "ray {i}: {hit:?}, expected {expected:?}");
                 }
                 (None, None) => {}
-                _ => differ += 1, // on edges either neighbour may be hit
+                // where two surfaces or triangles meet either may be hit
+                (Some(hit), Some(expected)) if (hit.t - expected.t).abs() <= 1e-3 * expected.t.max(0.01) => {}
+                _ => differ += 1, // past an edge
             }
         }
-        assert!(differ < 40, "{differ} of 20000 rays hit something else, {to_world:?}");
+        assert!(differ < 40, "{differ} of 20000 rays hit something elsewhere, {to_world:?}");
     }
 }
 

@@ -206,7 +206,8 @@ mod tests {
             triangles.iter_mut().for_each(|t| t.swap(1, 2)); // the front stays
         }
         let mut moved = Mesh::new(mesh.positions().iter().map(|p| to_world.transform_point3(*p)).collect(), triangles);
-        moved.normals = mesh.normals.iter().map(|n| (normals * n.as_dvec3()).normalize().as_vec3()).collect();
+        // not of unit length: what lies between two normals is transformed as they are
+        moved.normals = mesh.normals.iter().map(|n| (normals * n.as_dvec3()).as_vec3()).collect();
         moved
     }
 
@@ -229,9 +230,8 @@ mod tests {
                     continue; // past an edge
                 }
                 compared += 1;
-                // the world's triangles interpolate between transformed normals, those of the group are transformed after
                 let context = || format!("{to_world:?}: {found:?}, not {expected:?}");
-                assert!(found.frame.n.distance(expected.frame.n) < 1e-2, "{}", context());
+                assert!(found.frame.n.distance(expected.frame.n) < 1e-3, "{}", context());
                 neighbours += usize::from(found.ng.distance(expected.ng) > 1e-4);
                 assert!((found.lift.normalize() - found.ng).length() < 1e-5 && found.lift.length() > 0.9999);
             }

@@ -23,8 +23,8 @@ const FILES: &[(&str, &[u8])] = &[
     ("no.serialized", b"no serialized mesh at all"),
     ("short.serialized", b"\x1c\x04\x04\x00\x78\x9c"),
     ("no.ply", b"no ply at all\n"),
-    ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n"),
-    ("huge.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n1"),
+    ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n"),
+    ("huge.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n1"),
     ("flat.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n"),
     (
         "nan.ply",
@@ -481,7 +481,7 @@ fn singular_transforms_of_all_shapes_are_faults() {
         ("serialized", mesh("good.serialized")),
         ("sphere", String::new()),
     ] {
-        for scale in ["x='0'", "value='0'", "value='1e-30'", "x='1e30'"] {
+        for scale in ["x='0'", "value='0'", "value='1e-30'", "value='1e30'"] {
             let text = format!(
                 "<shape type='{kind}'>{inner}\n<transform name='to_world'><scale {scale}/></transform></shape>"
             );
@@ -527,8 +527,8 @@ fn meshes_that_cannot_be_used_are_faults() {
         ("letters.ply", "it is no readable PLY: vertex 2 of 2: line 9: \"far\" is no number of the type in the header"),
         ("no.serialized", "it is no serialized mesh: it begins with 0x6f6e, not 0x041c"),
         ("short.serialized", "it is no whole serialized mesh: "),
-        ("short.ply", "it is no readable PLY: "),
-        ("huge.ply", "it is no readable PLY: "),
+        ("short.ply", "it is no readable PLY: vertex 2 of 2: the file ends here"),
+        ("huge.ply", "it is no readable PLY: vertex 1 of 99999999999: the file ends here"),
         ("flat.ply", "its vertices have no x, y and z"),
         ("nan.ply", "vertex 3 is (0, NaN, 0); it must be finite"),
         ("range.ply", "triangle 2 refers to vertex 4 of 3"),

@@ -66,8 +66,8 @@ fn groups_and_instances_that_make_no_sense_are_faults() {
             "3:1: shape \"instance\" cannot hold a <shape>",
         ),
         (
-            "<shape type='instance'>\n<ref id='pear'/></shape>",
-            "3:10: no <shape> has the id \"pear\" (did you mean \"pair\"?)",
+            "<shape type='instance'>\n<ref id='pai'/></shape>",
+            "3:10: no <shape> has the id \"pai\" (did you mean \"pair\"?)",
         ),
         (
             "<bsdf type='diffuse' id='b'/><shape type='instance'>\n<ref id='b'/></shape>",

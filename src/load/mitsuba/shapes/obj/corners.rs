@@ -44,17 +44,22 @@ impl Corners {
     /// The vertex for a corner of a file that has had that many positions so far.
     #[inline]
     pub fn vertex(&mut self, corner: Corner, positions: usize) -> Result<u32, String> {
-        if let Corners::None = self {
-            *self = Corners::Alike { uvs: corner.uv.is_some(), normals: corner.normal.is_some() };
-        }
-        if let &mut Corners::Alike { uvs, normals } = self {
-            let alike = |has: bool| has.then_some(corner.position);
-            if corner.uv == alike(uvs) && corner.normal == alike(normals) {
-                return Ok(corner.position);
+        let alike = |has: bool| has.then_some(corner.position);
+        let is_alike = |uvs: bool, normals: bool| corner.uv == alike(uvs) && corner.normal == alike(normals);
+        match *self {
+            Corners::None => {
+                let (uvs, normals) = (corner.uv.is_some(), corner.normal.is_some());
+                if is_alike(uvs, normals) {
+                    *self = Corners::Alike { uvs, normals };
+                    return Ok(corner.position);
+                }
+                *self = Corners::Different(Table::default());
             }
-            *self = Corners::Different(Table::alike(positions, uvs, normals));
+            Corners::Alike { uvs, normals } if is_alike(uvs, normals) => return Ok(corner.position),
+            Corners::Alike { uvs, normals } => *self = Corners::Different(Table::alike(positions, uvs, normals)),
+            Corners::Different(_) => {}
         }
-        let Corners::Different(table) = self else { unreachable!("made above") };
+        let Corners::Different(table) = self else { unreachable!("made above or before") };
         table.vertex(corner)
     }
 
