@@ -27,7 +27,7 @@ pub(super) fn run(arguments: Info) -> Result<(), Failure> {
         faults if faults.is_empty() => {}
         faults => return Err(Failure::Input(faults)),
     }
-    let opened = arguments.scene.open()?;
+    let opened = arguments.scene.open(false)?;
     // Whoever reads may have read enough, as `head` does.
     drop(write!(io::stdout(), "{}", report(&opened)));
     Ok(())
@@ -115,6 +115,8 @@ fn shapes(features: &Features) -> Vec<String> {
         (counts.smooth_meshes, "meshes with shading normals"),
         (counts.spheres, "spheres"),
         (counts.disks, "disks"),
+        (counts.cylinders, "cylinders"),
+        (features.instances, "instances"),
     ])
 }
 
@@ -208,7 +210,8 @@ fn kernel(features: &Features) -> Vec<String> {
     match features.kernel() {
         Kernel::Diffuse => vec![
             "diffuse: diffuse materials on flat meshes, lit by meshes".to_owned(),
-            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, background, points"
+            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, cylinders, instances, \
+             background, points"
                 .to_owned(),
         ],
         Kernel::Plain => vec![
@@ -225,7 +228,7 @@ fn embree(device: &Device, features: &Features) -> Vec<String> {
         device.description(),
         format!("{}; packets native to this processor: {}", Tracer::BUILT_WITH, native.join(", ")),
     ];
-    if features.shapes.spheres + features.shapes.disks == 0 {
+    if features.shapes.quadrics() == 0 {
         lines.push("left out: user geometry".to_owned());
     }
     lines

@@ -4,6 +4,7 @@ mod compare;
 mod failure;
 mod info;
 mod ladder;
+mod loading;
 mod reference;
 mod render;
 mod scene;

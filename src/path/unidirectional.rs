@@ -107,6 +107,7 @@ impl Replay {
         hits.u.clone_from(&answers.u);
         hits.v.clone_from(&answers.v);
         hits.t.clone_from(&answers.t);
+        hits.instance.clone_from(&answers.instance);
         self.next_hits = (self.next_hits + 1) % self.recorded.hits.len();
     }
 

@@ -18,8 +18,12 @@ pub struct SceneDescription {
     pub film: FilmDescription,
     /// What surfaces look like, referred to by index.
     pub appearances: Vec<Appearance>,
-    /// Surfaces.
+    /// Surfaces in the world.
     pub shapes: Vec<ShapeDescription>,
+    /// Surfaces that are there only where instances place them.
+    pub groups: Vec<GroupDescription>,
+    /// Where the groups are.
+    pub instances: Vec<InstanceDescription>,
     /// Lights that are not surfaces.
     pub lights: Vec<Light>,
     /// What the person should know but which does not keep the scene from rendering, one sentence each.
@@ -120,12 +124,37 @@ impl FilmDescription {
     }
 }
 
+impl SceneDescription {
+    /// All surfaces: those in the world, then group by group those of groups.
+    pub fn all_shapes(&self) -> impl Iterator<Item = &ShapeDescription> {
+        self.shapes.iter().chain(self.groups.iter().flat_map(|group| &group.shapes))
+    }
+}
+
+/// Surfaces that belong together and do not emit, at least one.
+#[derive(Clone, Debug)]
+pub struct GroupDescription {
+    /// The group's id in the file, or a made-up one, for messages.
+    pub name: String,
+    /// The surfaces, in the group's own coordinates.
+    pub shapes: Vec<ShapeDescription>,
+}
+
+/// One appearance of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstanceDescription {
+    /// Index into [`SceneDescription::groups`].
+    pub group: usize,
+    /// The group's coordinates to those of the world; not singular.
+    pub to_world: Affine3A,
+}
+
 /// One surface.
 #[derive(Clone, Debug)]
 pub struct ShapeDescription {
     /// The shape's id in the file, or a made-up one, for messages.
     pub name: String,
-    /// Its geometry in world space.
+    /// Its geometry in world space, or in the group's.
     pub geometry: ShapeGeometry,
     /// What its two sides do.
     pub sides: Sides,
@@ -133,7 +162,7 @@ pub struct ShapeDescription {
     pub emission: Option<Varying>,
 }
 
-/// Geometry of a surface, in world space.
+/// Geometry of a surface, in world space or in that of its group.
 #[derive(Clone, Debug)]
 pub enum ShapeGeometry {
     /// Triangles; the front is where they run counter-clockwise (flipped already if the file says so).
@@ -157,6 +186,19 @@ pub enum ShapeGeometry {
         radius: f32,
         /// Its own axes, orthonormal, of which the third is the normal of the front.
         axes: Mat3,
+    },
+    /// An exact cylinder without caps; the front is the outside unless flipped.
+    Cylinder {
+        /// Where the axis begins.
+        start: Vec3,
+        /// How long it is, > 0.
+        length: f32,
+        /// Radius, > 0.
+        radius: f32,
+        /// Its own axes, orthonormal, of which the third is that of the cylinder.
+        axes: Mat3,
+        /// The front is the inside.
+        flipped: bool,
     },
 }
 
@@ -197,6 +239,8 @@ pub(super) mod tests {
             film: FilmDescription::new(1, 1, Filter::Box),
             appearances: Vec::new(),
             shapes: Vec::new(),
+            groups: Vec::new(),
+            instances: Vec::new(),
             lights,
             warnings: Vec::new(),
         }

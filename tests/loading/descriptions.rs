@@ -446,6 +446,30 @@ fn spheres_and_disks_are_scaled_turned_and_moved() {
 }
 
 #[test]
+fn cylinders_are_scaled_turned_and_moved_and_may_be_stretched_along_their_axis() {
+    let cylinder = |text: &str| match shape(&[], text).geometry {
+        ShapeGeometry::Cylinder { start, length, radius, axes, flipped } => {
+            assert_near(axes.x_axis.cross(axes.y_axis), axes.z_axis, "axes");
+            (start, start + length * axes.z_axis, radius, flipped)
+        }
+        other => panic!("a cylinder: {other:?}"),
+    };
+    let (start, end, radius, flipped) = cylinder("<shape type='cylinder'/>");
+    assert_eq!((start, end, radius, flipped), (Vec3::ZERO, Vec3::Z, 1.0, false));
+    let text = "<shape type='cylinder'><point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='2' z='0'/>
+        <float name='radius' value='3'/><boolean name='flip_normals' value='true'/><transform name='to_world'>
+        <scale x='2' y='5' z='2'/><rotate z='1' angle='90'/><translate z='5'/></transform></shape>";
+    let (start, end, radius, flipped) = cylinder(text);
+    assert_near(start, Vec3::new(0.0, 2.0, 5.0), "start");
+    assert_near(end, Vec3::new(-10.0, 2.0, 5.0), "end");
+    assert!((radius - 6.0).abs() < 1e-5 && flipped);
+    // in a mirror the front stays outside and surface coordinates are mirrored, as in Mitsuba
+    let text = "<shape type='cylinder'><transform name='to_world'><scale x='-1'/></transform></shape>";
+    let ShapeGeometry::Cylinder { axes, flipped, .. } = shape(&[], text).geometry else { panic!("a cylinder") };
+    assert_eq!((axes.x_axis, axes.y_axis, axes.z_axis, flipped), (Vec3::NEG_X, Vec3::Y, Vec3::Z, false));
+}
+
+#[test]
 fn shading_normals_stay_perpendicular_under_uneven_scales() {
     // The plane with normal (0, 0.6, 0.8), scaled by 1, 2, 3.
     let normals = &mesh(&scaled("obj", "1, 2, 3", SMOOTH)).normals.clone();
@@ -453,7 +477,32 @@ fn shading_normals_stay_perpendicular_under_uneven_scales() {
     assert_near(normals[0], Vec3::new(0.0, 0.6 / 2.0, 0.8 / 3.0).normalize(), "normal");
     let flipped = scaled("obj", "1", &[SMOOTH, FLIP].concat());
     assert_near(mesh(&flipped).normals[0], Vec3::new(0.0, -0.6, -0.8), "flipped normal");
-    assert!(mesh(&scaled("obj", "1", FLAT)).normals.is_empty(), "none in the file, none made up");
+    assert!(mesh(&scaled("obj", "1", &[SMOOTH, FACE_NORMALS].concat())).normals.is_empty());
+}
+
+#[test]
+fn meshes_without_normals_get_smooth_ones_as_in_mitsuba() {
+    let obj: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n";
+    let ply: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 2\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1 2\n3 1 3 2\n";
+    // as Mitsuba 3.9.1 has them: weighted by angles, 45° and 60° at the fold
+    let fold = Vec3::new(-0.370_482_77, -0.370_482_77, 0.851_754_07);
+    let expected = [Vec3::Z, fold, fold, Vec3::new(-1.0, -1.0, 1.0).normalize()];
+    for (kind, content) in [("obj", obj), ("ply", ply)] {
+        let file = format!("folded.{kind}");
+        let read = |inner: &str| {
+            let text = format!("<shape type='{kind}'><string name='filename' value='{file}'/>{inner}</shape>");
+            mesh(&shape(&[(&file, content)], &text)).clone()
+        };
+        for (i, expected) in expected.into_iter().enumerate() {
+            assert_near(read("").normals[i], expected, &format!("{kind}, normal {i}"));
+            assert_near(read(FLIP).normals[i], -expected, &format!("{kind}, flipped normal {i}"));
+        }
+        // a mirror turns them, as it turns the corners
+        let mirrored = read("<transform name='to_world'><scale x='-1'/></transform>");
+        assert_near(mirrored.normals[1], Vec3::new(-fold.x, fold.y, fold.z) * -1.0, "mirrored");
+        assert!(read(FACE_NORMALS).normals.is_empty());
+    }
 }
 
 #[test]

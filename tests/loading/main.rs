@@ -5,3 +5,5 @@ mod cameras;
 mod descriptions;
 mod faults;
 mod files;
+mod instances;
+mod memory;

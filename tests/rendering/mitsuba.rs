@@ -27,18 +27,28 @@ fn rough_materials_are_what_mitsuba_makes_of_them() {
 }
 
 #[test]
+fn principled_materials_are_what_mitsuba_makes_of_them() {
+    check(&["principled", "principled-glass", "principled-varied"]);
+}
+
+#[test]
 fn textures_are_what_mitsuba_makes_of_them() {
     check(&["textures", "relief", "picture-lights"]);
 }
 
 #[test]
 fn lights_are_what_mitsuba_makes_of_them() {
-    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light"]);
+    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light", "cylinder-light"]);
 }
 
 #[test]
 fn shapes_are_what_mitsuba_makes_of_them() {
-    check(&["smooth", "flipped"]);
+    check(&["smooth", "flipped", "cylinder", "serialized"]);
+}
+
+#[test]
+fn instances_are_what_mitsuba_makes_of_them() {
+    check(&["instances"]);
 }
 
 #[test]

@@ -174,7 +174,7 @@ const NOTHING_IS_MASKED: f32 = 4.0;
 /// along `v` is reflected to, which is uniform there.
 /// Source: Dupuy & Benyoub 2023, "Sampling visible GGX normals with spherical caps".
 #[inline(always)]
-fn visible_hemisphere_normal(v: Vec3, u: [f32; 2]) -> Vec3 {
+pub(super) fn visible_hemisphere_normal(v: Vec3, u: [f32; 2]) -> Vec3 {
     let z = (1.0 - u[1]) * (1.0 + v.z) - v.z;
     let r = (1.0 - z * z).max(0.0).sqrt();
     let (s, c) = sin_cos_turn(u[0]);

@@ -6,6 +6,7 @@
 //! To add one: a new file and one line in the registry below. The tests at the end of this folder iterate the
 //! registry, so a new member arrives tested.
 
+mod burley;
 mod coat;
 mod conductor;
 mod dielectric;
@@ -14,6 +15,7 @@ mod fresnel;
 mod microfacets;
 mod null;
 mod plastic;
+mod principled;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
@@ -29,6 +31,7 @@ pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use null::Null;
 pub use plastic::Plastic;
+pub use principled::Principled;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
 pub use roughplastic::RoughPlastic;
@@ -145,6 +148,11 @@ impl VaryingParameter {
     /// A colour with channels within 0…1.
     pub const fn reflectance(name: &'static str) -> VaryingParameter {
         VaryingParameter { name, range: Range::Reflectance }
+    }
+
+    /// A number within 0…1.
+    pub const fn fraction(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Fraction }
     }
 
     /// A number that is not negative.
@@ -278,6 +286,7 @@ registry! {
     "diffuse" => Diffuse,
     "null" => Null,
     "plastic" => Plastic,
+    "principled" => Principled,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
     "roughplastic" => RoughPlastic,
