@@ -1,6 +1,7 @@
 //! Command lines to typed jobs: one file a subcommand.
 
 mod compare;
+mod convert;
 mod failure;
 mod info;
 mod ladder;
@@ -32,6 +33,7 @@ enum Command {
     Study(study::StudyArguments),
     Compare(compare::Compare),
     Reference(Box<reference::Reference>),
+    Convert(convert::Convert),
 }
 
 const EXIT_CODES: &str = "\
@@ -61,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Study(arguments) => study::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Reference(arguments) => reference::run(*arguments),
+        Command::Convert(arguments) => convert::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

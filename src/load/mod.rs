@@ -3,12 +3,13 @@
 //! A reader goes on after a fault, so that one [`LoadError`] tells all that is wrong with a file. To add a format:
 //! a new module and a line in `FORMATS`.
 
-mod faults;
+pub(crate) mod faults;
 mod mitsuba;
 
 use std::path::Path;
 
 pub use faults::{Fault, LoadError};
+pub(crate) use mitsuba::parse_ply;
 
 use crate::scene::SceneDescription;
 

@@ -29,6 +29,7 @@ use crate::scene::lights::Light;
 use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
+pub use shapes::parse_ply;
 
 /// Reads the text of the scene file at `path`.
 pub fn read(path: &Path, text: String, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {

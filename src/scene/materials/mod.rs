@@ -22,6 +22,7 @@ mod tests;
 use glam::Vec3;
 
 pub use conductor::Conductor;
+pub(crate) use conductor::PRESETS as CONDUCTORS;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use plastic::Plastic;

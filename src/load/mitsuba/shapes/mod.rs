@@ -24,7 +24,10 @@ use crate::load::faults::{Faults, Span};
 use crate::scene::Rgb;
 use crate::scene::description::{ShapeDescription, ShapeGeometry, Sides};
 use crate::scene::parameters::Parameters;
-use mesh::{Placement, RawMesh, Repairs};
+use mesh::{Placement, Repairs};
+
+pub use mesh::RawMesh;
+pub use ply::parse as parse_ply;
 
 const SHAPES: Registry<fn(&mut ElementParameters, &Path) -> Option<Build>> = Registry {
     tag: "shape",

@@ -19,7 +19,7 @@ pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
 }
 
 /// The content of a file as one mesh.
-fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
+pub fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
     let mut reader = Reader::new(bytes);
     let fault = |error: &dyn std::fmt::Display| format!("it is no readable PLY: {}", one_line(&error.to_string()));
     let header = Parser::<DefaultElement>::new().read_header(&mut reader).map_err(|e| fault(&e))?;
