@@ -106,7 +106,7 @@ const FILTERS: &[(&str, &[Row])] = &[
     ("box", &[same("radius", Quiet)]),
     ("tent", &[same("radius", Float)]),
     ("gaussian", &[same("stddev", Float)]),
-    ("mitchell", &[("b", "A", Float), ("c", "B", Float)]),
+    ("mitchell", &[("b", "B", Float), ("c", "C", Float)]),
     ("catmullrom", &[]),
     ("lanczos", &[same("lobes", Integer)]),
 ];

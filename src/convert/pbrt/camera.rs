@@ -14,6 +14,9 @@ use crate::load::faults::list;
 /// What pbrt renders without a `Film`.
 const SIZE: [i64; 2] = [1280, 720];
 
+/// pbrt sees without end, Mitsuba's cameras only as far as this, 10,000 where nothing is said.
+const FAR: f64 = 1e6;
+
 /// Largest deviation of a window's aspect from the picture's that is not a stretch.
 const ASPECT_TOLERANCE: f64 = 1e-3;
 
@@ -109,7 +112,9 @@ impl Converter<'_> {
             Element::plugin("sensor", "perspective")
         };
         sensor = sensor.transform("to_world", to_world).float("fov", across).string("fov_axis", "x");
-        let offset = [-(left + right) / 2.0 / (right - left), (bottom + top) / 2.0 / (top - bottom)];
+        sensor = sensor.float("far_clip", FAR);
+        // positive ones look to the right and down
+        let offset = [(left + right) / 2.0 / (right - left), -(bottom + top) / 2.0 / (top - bottom)];
         for (name, offset) in ["principal_point_offset_x", "principal_point_offset_y"].into_iter().zip(offset) {
             if offset.abs() > 1e-6 {
                 sensor = sensor.float(name, offset);
@@ -206,7 +211,7 @@ impl Converter<'_> {
                     self.notes.changed(&filter.place, "Mitchell's filter is two pixels wide on either side");
                 }
                 let [b, c] = ["B", "C"].map(|name| filter.float(name).unwrap_or(1.0 / 3.0));
-                Element::plugin("rfilter", "mitchell").float("A", b).float("B", c)
+                Element::plugin("rfilter", "mitchell").float("B", b).float("C", c)
             }
             "sinc" => {
                 let lobes = filter.float("tau").unwrap_or(3.0);
@@ -275,7 +280,7 @@ fn orthographic(to_world: DAffine3, scale: f64, [left, right, bottom, top]: [f64
     let middle = DVec3::new(-(left + right) / 2.0, (bottom + top) / 2.0, 0.0) * scale;
     let half = (right - left) / 2.0 * scale;
     let own = DAffine3::from_translation(middle) * DAffine3::from_scale(DVec3::new(half, half, 1.0));
-    Element::plugin("sensor", "orthographic").transform("to_world", to_world * own)
+    Element::plugin("sensor", "orthographic").transform("to_world", to_world * own).float("far_clip", FAR)
 }
 
 /// How much brighter the film makes the picture than what meets it: exposure time times ISO over 100.

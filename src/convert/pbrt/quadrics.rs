@@ -57,17 +57,29 @@ fn even_scale(map: DAffine3) -> Option<f64> {
     (is_even && is_square).then_some(scale)
 }
 
+/// A map that does not mirror and does the same to what is round about z, and what it does to pbrt's u.
+///
+/// Mitsuba turns mirrored spheres inside out and mirrored disks not; without mirrors there is nothing to mind.
+fn without_mirror(map: DAffine3) -> (DAffine3, DAffine2) {
+    if map.matrix3.determinant() > 0.0 {
+        return (map, DAffine2::IDENTITY);
+    }
+    let backwards = DAffine2 { matrix2: DMat2::from_diagonal(DVec2::new(-1.0, 1.0)), translation: DVec2::X };
+    (map * DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), backwards)
+}
+
 fn sphere(shape: &Shape, radius: f64, turn: f64) -> Quadric {
     let p = &shape.parameters;
     let (z_min, z_max) = z_range(p, -radius, radius);
     let is_whole = turn == 360.0 && z_min <= -radius && z_max >= radius;
     if let (true, Some(scale)) = (is_whole, even_scale(shape.to_world)) {
-        let to_world = shape.to_world * DAffine3::from_scale(DVec3::splat(radius));
-        let element = Element::plugin("shape", "sphere").transform("to_world", to_world);
+        let (to_world, u) = without_mirror(shape.to_world);
+        let element =
+            Element::plugin("shape", "sphere").transform("to_world", to_world * DAffine3::from_scale(DVec3::splat(radius)));
         // pbrt's v runs from −z to +z, Mitsuba's from +z to −z
-        let map = DAffine2 { matrix2: DMat2::from_diagonal(DVec2::new(1.0, -1.0)), translation: DVec2::Y };
+        let v = DAffine2 { matrix2: DMat2::from_diagonal(DVec2::new(1.0, -1.0)), translation: DVec2::Y };
         let world_radius = radius * scale;
-        return Quadric::Exact(element, 4.0 * PI * world_radius * world_radius, map);
+        return Quadric::Exact(element, 4.0 * PI * world_radius * world_radius, u * v);
     }
     let [low, high] = [z_min, z_max].map(|z| libm::acos((z / radius).clamp(-1.0, 1.0)));
     Quadric::Mesh(grid(turn, |around, v| {
@@ -82,12 +94,13 @@ fn disk(shape: &Shape, radius: f64, turn: f64) -> Quadric {
     let (height, inner) = (p.float("height").unwrap_or(0.0), p.float("innerradius").unwrap_or(0.0));
     let is_whole = turn == 360.0 && inner <= 0.0;
     if let (true, Some(scale)) = (is_whole, even_scale(shape.to_world)) {
+        let (to_world, u) = without_mirror(shape.to_world);
         let own = DAffine3::from_translation(DVec3::Z * height) * DAffine3::from_scale(DVec3::splat(radius));
-        let element = Element::plugin("shape", "disk").transform("to_world", shape.to_world * own);
+        let element = Element::plugin("shape", "disk").transform("to_world", to_world * own);
         // pbrt's u is the angle and v the way inwards, Mitsuba's u the way outwards and v the angle
-        let map = DAffine2 { matrix2: DMat2::from_cols(DVec2::new(0.0, -1.0), DVec2::X), translation: DVec2::Y };
+        let swapped = DAffine2 { matrix2: DMat2::from_cols(DVec2::new(0.0, -1.0), DVec2::X), translation: DVec2::Y };
         let world_radius = radius * scale;
-        return Quadric::Exact(element, PI * world_radius * world_radius, map);
+        return Quadric::Exact(element, PI * world_radius * world_radius, u * swapped);
     }
     Quadric::Mesh(grid(turn, |around, v| {
         let r = radius + (inner - radius) * v;
