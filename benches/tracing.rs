@@ -7,9 +7,9 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use relt::embree::{Hits, Rays, Width};
-use relt::math::warp;
+use relt::math::{Frame, warp};
 use relt::render::calibration::record_rays;
 use relt::rng::{Counter, Purpose, Rng, unit_f32};
 use relt::scene::SceneDescription;
@@ -69,8 +69,11 @@ fn quadrics() -> SceneDescription {
         let ([x, y, z, r], [s, t, ..]) = (words(0), words(1));
         let (center, radius) = (2.0 * Vec3::new(x, y, z) - 1.0, 0.02 + 0.3 * r);
         let geometry = match i % 2 {
-            0 => ShapeGeometry::Sphere { center, radius, flipped: false },
-            _ => ShapeGeometry::Disk { center, normal: warp::sphere([s, t]), radius },
+            0 => ShapeGeometry::Sphere { center, radius, axes: Mat3::IDENTITY, flipped: false },
+            _ => {
+                let Frame { s, t, n } = Frame::new(warp::sphere([s, t]));
+                ShapeGeometry::Disk { center, radius, axes: Mat3::from_cols(s, t, n) }
+            }
         };
         ShapeDescription {
             name: format!("quadric {i}"),

@@ -32,7 +32,7 @@ fn diffuse_scenes_with_one_light_spend_no_dimension_on_choices() {
                 "bounces 5 to 15: 5 (direction 2, place on light 2, roulette 1), drawn in two blocks of four",
                 "left out: lens, choice of lobe, choice of light",
                 "left out: conductor, dielectric",
-                "area: 1 left out: point or spot, directional, constant",
+                "area: 1 left out: point or spot, directional, constant or envmap",
                 "kernel diffuse",
             ],
         );
@@ -40,7 +40,7 @@ fn diffuse_scenes_with_one_light_spend_no_dimension_on_choices() {
 }
 
 #[test]
-fn glass_takes_the_full_kernel_and_a_choice_of_lobe() {
+fn glass_takes_the_plain_kernel_and_a_choice_of_lobe() {
     assert_says(
         "caustic",
         &[],
@@ -49,7 +49,7 @@ fn glass_takes_the_full_kernel_and_a_choice_of_lobe() {
             "1 dielectric: perfect reflection and perfect refraction",
             "bounces 1 to 4: 5 (direction 2, place on light 2, lobe 1), drawn in two blocks of four",
             "left out: lens, choice of light",
-            "kernel full, for the scene has conductor materials, dielectric materials",
+            "kernel plain, for the scene has conductor materials, dielectric materials left out: textures",
         ],
     );
 }

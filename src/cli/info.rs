@@ -11,7 +11,7 @@ use crate::embree::{Device, Scene as Tracer};
 use crate::film::{Accumulator, Filter};
 use crate::path::Layout;
 use crate::scene::description::FilmDescription;
-use crate::scene::{Features, Kernel, Scene, materials};
+use crate::scene::{Appearance, Features, Kernel, Scene, materials};
 use crate::tempering::{Choices, Layers};
 
 /// Prints what a scene uses, and what is therefore left out
@@ -105,7 +105,7 @@ fn lights(features: &Features) -> Vec<String> {
         (features.area_lights, "area"),
         (features.point_lights, "point or spot"),
         (features.directional_lights, "directional"),
-        (features.infinite_lights, "constant"),
+        (features.infinite_lights, "constant or envmap"),
     ])
 }
 
@@ -123,13 +123,20 @@ fn left_out(what: &[&str]) -> Option<String> {
 /// The kinds of materials with their lobes.
 fn materials(scene: &Scene) -> Vec<String> {
     let mut kinds = BTreeMap::new();
-    for material in scene.materials() {
+    for part in scene.appearances().iter().flat_map(Appearance::parts) {
+        let material = &part.material;
         *kinds.entry((material.name(), material.lobes().in_words().join(" and "))).or_insert(0) += 1;
     }
     let used = kinds.iter().map(|((name, lobes), n)| format!("{n} {name}: {lobes}"));
     let unused: Vec<_> =
         materials::KNOWN.iter().copied().filter(|name| !scene.features.materials.contains_key(name)).collect();
-    used.chain(left_out(&unused)).collect()
+    let variations = used_and_left_out(&[
+        (scene.features.textures, "textures"),
+        (scene.features.mixtures, "mixtures"),
+        (scene.features.reliefs, "with bent normals"),
+        (scene.features.anisotropic, "anisotropic"),
+    ]);
+    used.chain(left_out(&unused)).chain(variations).collect()
 }
 
 /// Primary dimensions of the film position and, bounce by bounce, of the decisions there.
@@ -179,9 +186,11 @@ fn kernel(features: &Features) -> Vec<String> {
             "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, background, points"
                 .to_owned(),
         ],
-        Kernel::Full => {
-            vec![format!("full, for the scene has {}", features.beyond_diffuse().join(", "))]
-        }
+        Kernel::Plain => vec![
+            format!("plain, for the scene has {}", features.beyond_diffuse().join(", ")),
+            "left out: textures, mixtures of materials, bent normals, tangents".to_owned(),
+        ],
+        Kernel::Full => vec![format!("full, for the scene has {}", features.beyond_plain().join(", "))],
     }
 }
 

@@ -1,53 +1,26 @@
 //! Pictures whose pixels a conversion has to compute with.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use super::spectra::linear_of_srgb;
-use crate::film::{Image, exr_file};
+use crate::film::Image;
+use crate::load::images;
+use crate::scene::textures::Texels;
 
-/// Most pixels of a picture that is computed with; keeps hostile headers from exhausting the memory.
-const MOST_PIXELS: u64 = 1 << 28;
-
-/// Reads PNG or OpenEXR as linear colours, without opacity; with `raw`, the numbers of the file as they are, bytes as
-/// parts of 255.
+/// Reads a picture as linear colours, without opacity; with `raw`, the numbers of the file as they are, bytes as parts
+/// of 255.
 pub(super) fn read(path: &Path, raw: bool) -> Result<Image, String> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match &extension[..] {
-        "png" => read_png(path, raw).map_err(|message| format!("{}: {message}", path.display())),
-        "exr" => exr_file::read_file(path).map(|contents| contents.image).map_err(|error| error.to_string()),
-        _ => Err(format!("{}: computing with pixels needs PNG or OpenEXR", path.display())),
-    }
-}
-
-fn read_png(path: &Path, raw: bool) -> Result<Image, String> {
-    let file = File::open(path).map_err(|error| format!("cannot be read: {error}"))?;
-    let mut decoder = png::Decoder::new(BufReader::new(file));
-    decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
-    let (width, height) = (reader.info().width, reader.info().height);
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(format!("{width} × {height} pixels are too many"));
-    }
-    let size = reader.output_buffer_size().ok_or("its size is beyond what a machine can hold")?;
-    let mut bytes = vec![0; size];
-    let info = reader.next_frame(&mut bytes).map_err(|error| error.to_string())?;
-    bytes.truncate(info.buffer_size());
-    let values: Vec<f64> = match info.bit_depth {
-        png::BitDepth::Sixteen => {
-            bytes.as_chunks().0.iter().map(|pair| f64::from(u16::from_be_bytes(*pair)) / 65535.0).collect()
-        }
-        _ => bytes.iter().map(|byte| f64::from(*byte) / 255.0).collect(),
-    };
-    let channels = info.color_type.samples();
+    let picture = images::read(path)?;
     let decode = |value: f64| (if raw { value } else { linear_of_srgb(value) }) as f32;
-    let pixel = |values: &[f64]| match values {
-        [r, g, b, ..] => [*r, *g, *b].map(decode),
-        [grey, ..] => [decode(*grey); 3],
-        [] => unreachable!("every colour type has a channel"),
+    let pixels = match picture.texels {
+        Texels::Floats(pixels) => pixels,
+        Texels::Bytes(bytes) => {
+            let decoded: [f32; 256] = std::array::from_fn(|byte| decode(byte as f64 / 255.0));
+            bytes.iter().map(|rgb| rgb.map(|byte| decoded[usize::from(byte)])).collect()
+        }
+        Texels::Words(words) => words.iter().map(|rgb| rgb.map(|word| decode(f64::from(word) / 65535.0))).collect(),
     };
-    Ok(Image::new(width, height, values.chunks_exact(channels).map(pixel).collect()))
+    Ok(Image::new(picture.width, picture.height, pixels))
 }
 
 /// The value at a place in the unit square, (0, 0) at the corner of the first pixel, linear between the centres of

@@ -4,6 +4,7 @@
 //! a new module and a line in `FORMATS`.
 
 pub(crate) mod faults;
+pub(crate) mod images;
 mod mitsuba;
 
 use std::path::Path;

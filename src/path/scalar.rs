@@ -32,7 +32,7 @@ pub fn evaluate<P: Profile>(
 
     for bounce in 0..layout.max_depth() {
         let Some(hit) = scene.tracer.closest_one(ray.origin, ray.direction, ray.tfar) else {
-            radiance += vertex::background::<P>(scene, &carried);
+            radiance += vertex::background::<P>(scene, ray.direction, &carried);
             break;
         };
         let surface = scene.surface::<P>(hit, ray.origin, ray.direction);

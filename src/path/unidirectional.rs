@@ -11,7 +11,7 @@ use crate::{
     embree::{Hits, MISS, Rays, Width},
     rng::unit_f32,
     sample::Proposals,
-    scene::{DiffuseProfile, FullProfile, Kernel, Profile, Rgb, Scene},
+    scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Rgb, Scene},
 };
 
 /// Packet widths by kind of ray.
@@ -126,9 +126,10 @@ impl<'s> Mapping<'s> {
 
     /// The mapping by a given kernel, which must do all that the scene needs.
     pub fn with_kernel(scene: &'s Scene, widths: Widths, kernel: Kernel) -> Mapping<'s> {
-        assert!(kernel == Kernel::Full || kernel == scene.features.kernel(), "the scene needs more than {kernel:?}");
+        assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
         let kernel = match kernel {
             Kernel::Diffuse => evaluate::<DiffuseProfile>,
+            Kernel::Plain => evaluate::<PlainProfile>,
             Kernel::Full => evaluate::<FullProfile>,
         };
         Mapping { scene, layout: Layout::new(&scene.features), widths, kernel }
@@ -218,7 +219,7 @@ fn keep_hits<P: Profile>(scene: &Scene, w: &mut Workspace) {
     for i in 0..w.lanes.len() {
         let lane = w.lanes[i];
         if w.hits.geometry[i] == MISS {
-            w.radiance[lane as usize] += vertex::background::<P>(scene, &w.carried[i]);
+            w.radiance[lane as usize] += vertex::background::<P>(scene, w.rays.direction(i), &w.carried[i]);
         } else {
             w.hit_slots.push(i as u32);
             w.hit_lanes.push(lane);
@@ -286,7 +287,7 @@ fn collect_emission<P: Profile>(scene: &Scene, w: &mut Workspace) {
         let (origin, direction, carried) = (w.rays.origin(i), w.rays.direction(i), &w.carried[i]);
         w.radiance[w.lanes[i] as usize] += match w.hits.get(i) {
             Some(hit) => vertex::emission::<P>(scene, &scene.surface::<P>(hit, origin, direction), origin, carried),
-            None => vertex::background::<P>(scene, carried),
+            None => vertex::background::<P>(scene, direction, carried),
         };
     }
 }

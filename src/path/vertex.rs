@@ -10,7 +10,7 @@ use crate::{
     sample::Block,
     scene::{
         NO_LIGHT, Profile, Rgb, Scene, Surface,
-        materials::{Evaluation, Material, Scatter, ScatterSample},
+        materials::{Evaluation, ScatterSample},
     },
 };
 
@@ -85,8 +85,8 @@ fn power_heuristic(a: f32, b: f32) -> f32 {
 
 /// Radiance along an edge that left the scene.
 #[inline(always)]
-pub(super) fn background<P: Profile>(scene: &Scene, carried: &Carried) -> Rgb {
-    let Some((radiance, pdf)) = scene.emitters.surrounding::<P>() else { return Rgb::ZERO };
+pub(super) fn background<P: Profile>(scene: &Scene, direction: Vec3, carried: &Carried) -> Rgb {
+    let Some((radiance, pdf)) = scene.emitters.surrounding::<P>(direction) else { return Rgb::ZERO };
     carried.throughput * radiance * power_heuristic(carried.pdf, pdf)
 }
 
@@ -100,7 +100,7 @@ pub(super) fn emission<P: Profile>(scene: &Scene, surface: &Surface, origin: Vec
     if carried.pdf != f32::INFINITY {
         weight = power_heuristic(carried.pdf, scene.emitters.pdf::<P>(surface.light, origin, surface.p, surface.ng));
     }
-    carried.throughput * scene.emitters.radiance(surface.light) * weight
+    carried.throughput * scene.emitters.radiance::<P>(surface.light, surface.uv) * weight
 }
 
 /// Next-event estimation: the light's contribution if nothing stands between.
@@ -111,11 +111,11 @@ pub(super) fn connection<P: Profile>(
     carried: &Carried,
     decisions: &Decisions,
 ) -> Option<Connection> {
-    if !P::DIFFUSE && !surface.material.lobes().smooth {
+    if !surface.scattering.is_smooth::<P>() {
         return None;
     }
     let light = scene.emitters.sample::<P>(surface.p, surface.ng, decisions.light_place, decisions.light)?;
-    let Evaluation { value, pdf } = evaluate::<P>(surface.material, surface.wo, surface.frame.to_local(light.wi));
+    let Evaluation { value, pdf } = surface.scattering.evaluate::<P>(surface.wo, surface.frame.to_local(light.wi));
     let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
     (contribution != Rgb::ZERO).then_some(Connection {
         origin: light.origin,
@@ -129,7 +129,7 @@ pub(super) fn connection<P: Profile>(
 #[inline(always)]
 pub(super) fn scatter<P: Profile>(surface: &Surface, carried: &Carried, decisions: &Decisions) -> Option<Edge> {
     let ScatterSample { wi, weight, pdf, eta } =
-        sample::<P>(surface.material, surface.wo, decisions.direction, decisions.lobe)?;
+        surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
     let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta };
     if let Some(u) = decisions.roulette {
         let survival = (next.throughput.max_element() * next.eta * next.eta).min(0.95);
@@ -144,24 +144,6 @@ pub(super) fn scatter<P: Profile>(surface: &Surface, carried: &Carried, decision
     let direction = surface.frame.to_world(wi);
     let side = if surface.ng.dot(direction) >= 0.0 { surface.ng } else { -surface.ng };
     Some(Edge { origin: offset_origin(surface.p, side), direction, carried: next })
-}
-
-#[inline(always)]
-fn sample<P: Profile>(material: &Material, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
-    match material {
-        Material::Diffuse(diffuse) => diffuse.sample(wo, u, choice),
-        _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-        other => other.sample(wo, u, choice),
-    }
-}
-
-#[inline(always)]
-fn evaluate<P: Profile>(material: &Material, wo: Vec3, wi: Vec3) -> Evaluation {
-    match material {
-        Material::Diffuse(diffuse) => diffuse.evaluate(wo, wi),
-        _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-        other => other.evaluate(wo, wi),
-    }
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Mat3, Vec3};
 
-use super::{Mesh, Rgb, lights::Light, materials::Material};
+use super::{Appearance, Mesh, lights::Light, textures::Varying};
 use crate::film::Filter;
 
 /// A scene as its file describes it. [`load`](crate::load) makes it, `Scene` is built from it.
@@ -16,8 +16,8 @@ pub struct SceneDescription {
     pub camera: CameraDescription,
     /// The picture.
     pub film: FilmDescription,
-    /// Scattering functions, referred to by index.
-    pub materials: Vec<Material>,
+    /// What surfaces look like, referred to by index.
+    pub appearances: Vec<Appearance>,
     /// Surfaces.
     pub shapes: Vec<ShapeDescription>,
     /// Lights that are not surfaces.
@@ -92,7 +92,7 @@ pub struct ShapeDescription {
     /// What its two sides do.
     pub sides: Sides,
     /// Radiance emitted from the front, where it is a light.
-    pub emission: Option<Rgb>,
+    pub emission: Option<Varying>,
 }
 
 /// Geometry of a surface, in world space.
@@ -106,6 +106,8 @@ pub enum ShapeGeometry {
         center: Vec3,
         /// Radius, > 0.
         radius: f32,
+        /// Its own axes, which surface coordinates refer to: a rotation.
+        axes: Mat3,
         /// The front is the inside.
         flipped: bool,
     },
@@ -113,20 +115,20 @@ pub enum ShapeGeometry {
     Disk {
         /// Centre.
         center: Vec3,
-        /// Unit normal of the front.
-        normal: Vec3,
         /// Radius, > 0.
         radius: f32,
+        /// Its own axes, orthonormal, of which the third is the normal of the front.
+        axes: Mat3,
     },
 }
 
-/// Materials of the two sides of a surface, as indices into [`SceneDescription::materials`].
+/// Appearances of the two sides of a surface, as indices into [`SceneDescription::appearances`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sides {
-    /// One material for a surface that has a front (an opaque one is black from behind, a dielectric
+    /// One for a surface that has a front (an opaque one is black from behind, a dielectric
     /// transmits between the two sides).
     One(u32),
-    /// A material for each side, each seeing the side it is on as its front (Mitsuba's `twosided`).
+    /// One for each side, each seeing the side it is on as its front (Mitsuba's `twosided`).
     Two {
         /// Of the front.
         front: u32,
@@ -151,7 +153,7 @@ pub(super) mod tests {
                 far_clip: 100.0,
             },
             film: FilmDescription { width: 1, height: 1, filter: Filter::Box },
-            materials: Vec::new(),
+            appearances: Vec::new(),
             shapes: Vec::new(),
             lights,
             warnings: Vec::new(),

@@ -1,6 +1,6 @@
 //! All lights of a built scene and the choice among them.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{
     Profile, Rgb, SceneDescription,
@@ -33,7 +33,7 @@ impl Emitters {
             })
             .collect();
         lights.extend(description.lights.iter().cloned());
-        let surrounding = lights.iter().position(|light| matches!(light, Light::Constant(_))).map(|i| i as u32);
+        let surrounding = lights.iter().position(Light::is_surrounding).map(|i| i as u32);
         let power = |light: &Light| f64::from(crate::path::luminance(light.power(scene_radius)));
         let total: f64 = lights.iter().map(power).sum();
         let uniform = 1.0 / lights.len().max(1) as f64;
@@ -58,25 +58,25 @@ impl Emitters {
 
     /// The largest channel of any radiance or intensity; a scale for the brightness of paths.
     pub fn brightest(&self) -> f32 {
-        self.lights.iter().map(|light| light.value().max_element()).fold(0.0, f32::max)
+        self.lights.iter().map(Light::largest).fold(0.0, f32::max)
     }
 
-    /// Radiance that a surface light sends from its front.
+    /// Radiance that a surface light sends from the place of its front with those surface coordinates.
     #[inline(always)]
-    pub fn radiance(&self, light: u32) -> Rgb {
-        self.lights[light as usize].value()
+    pub fn radiance<P: Profile>(&self, light: u32, uv: Vec2) -> Rgb {
+        self.lights[light as usize].radiance::<P>(uv)
     }
 
-    /// The light at infinity: its radiance and the density of sampling any direction to it, with respect to solid
-    /// angle.
+    /// The light at infinity in the direction `d`: its radiance and the density of sampling that direction, with respect
+    /// to solid angle.
     #[inline(always)]
-    pub fn surrounding<P: Profile>(&self) -> Option<(Rgb, f32)> {
+    pub fn surrounding<P: Profile>(&self, d: Vec3) -> Option<(Rgb, f32)> {
         if P::FLAT_MESHES {
             return None;
         }
         let light = self.surrounding? as usize;
-        let pdf = self.lights[light].pdf::<P>(Vec3::ZERO, Vec3::ZERO, Vec3::Z);
-        Some((self.lights[light].value(), self.probability[light] * pdf))
+        let pdf = self.lights[light].pdf::<P>(Vec3::ZERO, d, d);
+        Some((self.lights[light].radiance_from(d), self.probability[light] * pdf))
     }
 
     /// Samples a direction from the surface point `p` with geometric normal `ng`: `u` for the place on the light,
@@ -102,24 +102,34 @@ impl Emitters {
 
 #[cfg(test)]
 mod tests {
+    use glam::Mat3;
+
     use super::*;
     use crate::{
+        math::Frame,
         rng::{Counter, Purpose, Rng, unit_f32},
         scene::{
             FullProfile, Mesh,
             lights::{Constant, Disk, MeshLight, Sphere},
+            textures::Varying,
         },
     };
 
     /// Lights that surfaces or directions can hit, one of each kind, around the origin's upper hemisphere.
     fn lights() -> Vec<Light> {
         let corners = vec![Vec3::new(-1.0, -1.0, 2.0), Vec3::new(1.0, -1.0, 2.0), Vec3::new(0.0, 1.0, 3.0)];
+        let white = Varying::Constant(Rgb::ONE);
+        let sphere = |center: Vec3, radius: f32, flipped: bool| {
+            Light::Sphere(Sphere { center, radius, axes: Mat3::IDENTITY, flipped, radiance: Rgb::ONE.into() })
+        };
+        let Frame { s, t, n } = Frame::new(Vec3::new(0.6, 0.0, -0.8));
+        let disk_axes = Mat3::from_cols(s, t, n);
         vec![
             Light::Constant(Constant { radiance: Rgb::ONE }),
-            Light::Disk(Disk::new(Vec3::new(0.3, 0.0, 2.0), Vec3::new(0.6, 0.0, -0.8), 0.7, Rgb::ONE)),
-            Light::MeshLight(MeshLight::new(Mesh::new(corners, vec![[0, 2, 1]]).into(), Rgb::ONE)),
-            Light::Sphere(Sphere { center: Vec3::new(0.0, 1.0, 2.0), radius: 0.8, flipped: false, radiance: Rgb::ONE }),
-            Light::Sphere(Sphere { center: Vec3::ZERO, radius: 3.0, flipped: true, radiance: Rgb::ONE }),
+            Light::Disk(Disk::new(Vec3::new(0.3, 0.0, 2.0), 0.7, disk_axes, white.clone())),
+            Light::MeshLight(MeshLight::new(Mesh::new(corners, vec![[0, 2, 1]]).into(), white)),
+            sphere(Vec3::new(0.0, 1.0, 2.0), 0.8, false),
+            sphere(Vec3::ZERO, 3.0, true),
         ]
     }
 

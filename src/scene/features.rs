@@ -1,14 +1,18 @@
 //! What a scene needs, and so what can be left out.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use super::Appearance;
 use super::description::{Integrator, SceneDescription, ShapeGeometry};
 use super::lights::Light;
+use super::materials::Lobes;
+use super::textures::Varying;
 
 /// What a scene uses. Dimensions, kernels and messages follow from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Features {
-    /// Kinds of materials in use, with how many of each.
+    /// Kinds of materials in use, with how many of each; those of a mixture count each.
     pub materials: BTreeMap<&'static str, usize>,
     /// Some material has a lobe with a finite density.
     pub smooth_lobes: bool,
@@ -28,6 +32,14 @@ pub struct Features {
     pub shapes: ShapeCounts,
     /// Triangles of all meshes.
     pub triangles: usize,
+    /// Textures of materials, weights, reliefs and lights.
+    pub textures: usize,
+    /// Surfaces' sides that mix several materials.
+    pub mixtures: usize,
+    /// Surfaces' sides with bent normals.
+    pub reliefs: usize,
+    /// Materials that scatter differently along the surface's two directions.
+    pub anisotropic: usize,
     /// Limits on path length.
     pub integrator: Integrator,
 }
@@ -49,10 +61,18 @@ impl Features {
     /// What that scene needs.
     pub fn of(description: &SceneDescription) -> Features {
         let mut materials = BTreeMap::new();
-        for m in &description.materials {
-            *materials.entry(m.name()).or_insert(0) += 1;
+        let appearances = &description.appearances;
+        let parts = || appearances.iter().flat_map(Appearance::parts);
+        for part in parts() {
+            *materials.entry(part.material.name()).or_insert(0) += 1;
         }
-        let lobes: Vec<_> = description.materials.iter().map(|m| m.lobes()).collect();
+        let lobes = appearances.iter().map(Appearance::lobes).fold(Lobes::NONE, Lobes::or);
+        let of_lights = description.shapes.iter().filter_map(|shape| match &shape.emission {
+            Some(Varying::Textured(texture)) => Some(texture),
+            _ => None,
+        });
+        let textures: BTreeSet<_> =
+            appearances.iter().flat_map(Appearance::textures).chain(of_lights).map(Arc::as_ptr).collect();
         let mut shapes = ShapeCounts::default();
         let mut triangles = 0;
         for shape in &description.shapes {
@@ -68,15 +88,19 @@ impl Features {
         let count = |is: fn(&Light) -> bool| description.lights.iter().filter(|l| is(l)).count();
         Features {
             materials,
-            smooth_lobes: lobes.iter().any(|l| l.smooth),
-            delta_lobes: lobes.iter().any(|l| l.delta_reflection || l.delta_transmission),
-            lobe_choice: lobes.iter().any(|l| l.need_choice()),
+            smooth_lobes: lobes.smooth,
+            delta_lobes: lobes.has_delta(),
+            lobe_choice: appearances.iter().any(Appearance::needs_choice),
             area_lights: description.shapes.iter().filter(|s| s.emission.is_some()).count(),
             point_lights: count(|l| matches!(l, Light::Point(_) | Light::Spot(_))),
             directional_lights: count(|l| matches!(l, Light::Directional(_))),
-            infinite_lights: count(|l| matches!(l, Light::Constant(_))),
+            infinite_lights: count(Light::is_surrounding),
             shapes,
             triangles,
+            textures: textures.len(),
+            mixtures: appearances.iter().filter(|a| a.parts().len() > 1).count(),
+            reliefs: parts().filter(|part| part.relief.is_some()).count(),
+            anisotropic: parts().filter(|part| part.material.needs_tangents()).count(),
             integrator: description.integrator,
         }
     }
@@ -86,6 +110,9 @@ impl Features {
         let mut words: Vec<String> = self.materials.iter().map(|(name, n)| format!("{n} {name}")).collect();
         let shapes = &self.shapes;
         for (n, what) in [
+            (self.textures, "textures"),
+            (self.mixtures, "mixtures"),
+            (self.reliefs, "bent normals"),
             (self.triangles, "triangles"),
             (shapes.flat_meshes, "flat meshes"),
             (shapes.smooth_meshes, "meshes with shading normals"),
@@ -116,7 +143,24 @@ impl Features {
 
     /// The kernel to run: the smallest that does all the scene needs.
     pub fn kernel(&self) -> Kernel {
-        if self.beyond_diffuse().is_empty() { Kernel::Diffuse } else { Kernel::Full }
+        if self.beyond_diffuse().is_empty() {
+            Kernel::Diffuse
+        } else if self.beyond_plain().is_empty() {
+            Kernel::Plain
+        } else {
+            Kernel::Full
+        }
+    }
+
+    /// What the scene needs and [`Kernel::Plain`] cannot do, one short phrase each.
+    pub fn beyond_plain(&self) -> Vec<String> {
+        let needs = [
+            (self.textures, "textures"),
+            (self.mixtures, "mixtures of materials"),
+            (self.reliefs, "bent normals"),
+            (self.anisotropic, "anisotropic materials"),
+        ];
+        needs.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned()).collect()
     }
 
     /// What the scene needs and [`Kernel::Diffuse`] cannot do, one short phrase each.
@@ -131,15 +175,18 @@ impl Features {
             (self.directional_lights, "directional lights"),
             (self.infinite_lights, "lights at infinity"),
         ];
-        materials.chain(others.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned())).collect()
+        let others = others.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned());
+        materials.chain(others).chain(self.beyond_plain()).collect()
     }
 }
 
 /// The closed list of kernels, smallest first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kernel {
     /// Diffuse materials on flat meshes, lit by meshes.
     Diffuse,
+    /// All materials, shapes and lights, each the same everywhere.
+    Plain,
     /// Everything.
     Full,
 }
@@ -149,6 +196,7 @@ impl Kernel {
     pub fn name(self) -> &'static str {
         match self {
             Kernel::Diffuse => "diffuse",
+            Kernel::Plain => "plain",
             Kernel::Full => "full",
         }
     }
@@ -160,10 +208,15 @@ pub trait Profile {
     const DIFFUSE: bool;
     /// All shapes are triangle meshes without shading normals, so are all lights.
     const FLAT_MESHES: bool;
+    /// Surfaces may vary from place to place: textures, mixtures, bent normals, tangents that matter.
+    const VARYING: bool;
 }
 
 /// The profile of [`Kernel::Diffuse`].
 pub enum DiffuseProfile {}
+
+/// The profile of [`Kernel::Plain`].
+pub enum PlainProfile {}
 
 /// The profile of [`Kernel::Full`].
 pub enum FullProfile {}
@@ -171,9 +224,17 @@ pub enum FullProfile {}
 impl Profile for DiffuseProfile {
     const DIFFUSE: bool = true;
     const FLAT_MESHES: bool = true;
+    const VARYING: bool = false;
+}
+
+impl Profile for PlainProfile {
+    const DIFFUSE: bool = false;
+    const FLAT_MESHES: bool = false;
+    const VARYING: bool = false;
 }
 
 impl Profile for FullProfile {
     const DIFFUSE: bool = false;
     const FLAT_MESHES: bool = false;
+    const VARYING: bool = true;
 }

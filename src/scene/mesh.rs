@@ -52,6 +52,16 @@ impl Mesh {
         (a * (1.0 - u - v) + b * u + c * v).normalize_or(flat)
     }
 
+    /// Texture coordinates of triangle `t` at barycentric coordinates (1 − b − c, b, c); (b, c) where the mesh has none.
+    #[inline]
+    pub fn uv(&self, t: u32, b: f32, c: f32) -> Vec2 {
+        if self.uvs.is_empty() {
+            return Vec2::new(b, c);
+        }
+        let [uv0, uv1, uv2] = self.triangles[t as usize].map(|i| self.uvs[i as usize]);
+        uv0 * (1.0 - b - c) + uv1 * b + uv2 * c
+    }
+
     /// Area of triangle `t`, in the square of the scene's unit, computed in f64.
     pub fn area(&self, t: u32) -> f64 {
         let [a, b, c] = self.corners(t).map(|p| p.as_dvec3());

@@ -2,6 +2,7 @@
 //!
 //! [`SceneDescription`] is what a file says; [`Scene`] is what rays travel through.
 
+pub mod appearance;
 mod camera;
 pub mod description;
 mod emitters;
@@ -10,12 +11,16 @@ pub mod lights;
 pub mod materials;
 pub mod mesh;
 pub mod parameters;
+mod parametrisation;
+pub mod relief;
 mod surface;
+pub mod textures;
 
+pub use appearance::Appearance;
 pub use camera::{Camera, Ray};
 pub use description::SceneDescription;
 pub use emitters::Emitters;
-pub use features::{DiffuseProfile, Features, FullProfile, Kernel, Profile};
+pub use features::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
 pub use surface::{NO_LIGHT, Surface};
 
@@ -23,6 +28,7 @@ use crate::embree;
 use description::{FilmDescription, Integrator, ShapeGeometry, Sides};
 use materials::Material;
 use surface::Shape;
+use textures::Varying;
 
 /// A colour or a radiometric quantity in linear RGB (Rec. 709 primaries), one `f32` a channel.
 pub type Rgb = glam::Vec3;
@@ -42,6 +48,8 @@ pub struct Scene {
     /// The acceleration structure.
     pub tracer: embree::Scene,
     shapes: Vec<Shape>,
+    appearances: Vec<Appearance>,
+    /// The scattering function of each appearance that has a plain one (of others, that of their first part).
     materials: Vec<Material>,
 }
 
@@ -58,15 +66,21 @@ impl Scene {
             .iter()
             .zip(light_of_shape)
             .map(|(shape, light)| {
-                let (materials, two_sided) = match shape.sides {
+                let (appearances, two_sided) = match shape.sides {
                     Sides::One(m) => ([m, m], false),
                     Sides::Two { front, back } => ([front, back], true),
                 };
+                let depends = |m: u32| {
+                    let appearance = &description.appearances[m as usize];
+                    appearance.plain().is_none() || appearance.needs_tangents()
+                };
                 Shape {
                     kind: surface::Kind::new(&shape.geometry),
-                    materials,
+                    appearances,
                     two_sided,
                     light: light.unwrap_or(NO_LIGHT),
+                    varies: shape.emission.as_ref().is_some_and(Varying::is_textured)
+                        || appearances.into_iter().any(depends),
                 }
             })
             .collect();
@@ -78,13 +92,14 @@ impl Scene {
             features,
             tracer,
             shapes,
-            materials: description.materials,
+            materials: description.appearances.iter().map(|a| a.parts()[0].material).collect(),
+            appearances: description.appearances,
         })
     }
 
-    /// All materials.
-    pub fn materials(&self) -> &[Material] {
-        &self.materials
+    /// All appearances.
+    pub fn appearances(&self) -> &[Appearance] {
+        &self.appearances
     }
 }
 
@@ -92,6 +107,6 @@ fn geometry(g: &ShapeGeometry) -> embree::Geometry {
     match g {
         ShapeGeometry::Mesh(mesh) => embree::Geometry::Triangles(mesh.clone()),
         &ShapeGeometry::Sphere { center, radius, .. } => embree::Geometry::Sphere { center, radius },
-        &ShapeGeometry::Disk { center, normal, radius } => embree::Geometry::Disk { center, normal, radius },
+        &ShapeGeometry::Disk { center, radius, axes } => embree::Geometry::Disk { center, normal: axes.z_axis, radius },
     }
 }

@@ -4,7 +4,11 @@
 //! remembers which names were asked for: those are what the element knows, and any other name in the file is a
 //! fault that lists them.
 
-use super::Rgb;
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3, Mat3A};
+
+use super::{Rgb, textures::Image};
 
 /// A value that files give as a number or by name.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +42,11 @@ pub trait Parameters {
     /// A direction in the element's own coordinates, of any length.
     fn vector(&mut self, name: &str) -> Option<glam::Vec3>;
     /// The element's `to_world` transform, identity where absent.
-    fn to_world(&mut self) -> glam::Affine3A;
+    fn to_world(&mut self) -> Affine3A;
+    /// The element's `to_uv` transform of surface coordinates, identity where absent: what it does to x and y.
+    fn to_uv(&mut self) -> glam::Affine2;
+    /// The picture in the file of that name.
+    fn image(&mut self, name: &str) -> Option<Arc<Image>>;
     /// Reports a fault of the named parameter (of the element as a whole where the name is absent).
     fn fault(&mut self, name: &str, message: String);
 
@@ -65,4 +73,24 @@ pub trait Parameters {
             }
         }
     }
+}
+
+/// Largest entry of MᵀM/s² − 1 that still is a uniform scale s; covers matrices written with four digits.
+const SCALE_TOLERANCE: f32 = 1e-3;
+
+/// Axes (orthonormal; they may mirror) and scale of a transform that keeps angles, `None` of any other.
+pub fn similarity(transform: &Affine3A) -> Option<(Mat3, f32)> {
+    let matrix = transform.matrix3;
+    let scale = matrix.determinant().abs().cbrt();
+    let error = matrix.transpose() * matrix * (scale * scale).recip() + Mat3A::IDENTITY * -1.0;
+    if !error.to_cols_array().iter().all(|entry| entry.abs() <= SCALE_TOLERANCE) {
+        return None;
+    }
+    // straightened, since four digits leave axes askew
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(glam::Vec3::from);
+    let z = z.normalize();
+    let x = (x - z * z.dot(x)).normalize();
+    let handed = z.cross(x);
+    let y = if handed.dot(y) < 0.0 { -handed } else { handed };
+    Some((Mat3::from_cols(x, y, z), scale))
 }

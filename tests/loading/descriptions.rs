@@ -42,13 +42,13 @@ fn triangle_counts(scene: &SceneDescription) -> Vec<(&str, usize)> {
 
 /// Shapes that emit, and what.
 fn emissions(scene: &SceneDescription) -> Vec<(&str, Vec3)> {
-    scene.shapes.iter().filter_map(|s| Some((s.name.as_str(), s.emission?))).collect()
+    scene.shapes.iter().filter_map(|s| Some((s.name.as_str(), s.emission.as_ref()?.mean()))).collect()
 }
 
 /// The material of a shape's front.
 fn front<'a>(scene: &'a SceneDescription, shape: &ShapeDescription) -> &'a Material {
     match shape.sides {
-        Sides::One(m) | Sides::Two { front: m, .. } => &scene.materials[m as usize],
+        Sides::One(m) | Sides::Two { front: m, .. } => scene.appearances[m as usize].plain().expect("a plain one"),
     }
 }
 
@@ -88,7 +88,7 @@ fn the_cornell_box_loads_with_the_numbers_of_its_file() {
     // From (0, 0, 3.9) along −z with y up, x is to the left: that is a half turn about y.
     let expected = Affine3A::from_translation(Vec3::new(0.0, 0.0, 3.9)) * Affine3A::from_scale(Vec3::new(-1., 1., -1.));
     assert_same_map(scene.camera.to_world, expected, "camera");
-    assert_eq!(scene.materials.len(), 3, "each is listed once");
+    assert_eq!(scene.appearances.len(), 3, "each is listed once");
     assert!(scene.shapes.iter().all(|s| matches!(s.sides, Sides::Two { front, back } if front == back)));
     let Material::Diffuse(red) = front(&scene, named(&scene, "redwall")) else { panic!("red is diffuse") };
     assert_eq!(red.reflectance, Vec3::new(0.570068, 0.0430135, 0.0443706));
@@ -107,7 +107,7 @@ fn the_caustic_loads_with_glass_that_has_one_side_and_a_mirror_that_has_two() {
     let mirror = named(&scene, "mirrorball");
     assert!(matches!(mirror.sides, Sides::Two { .. }));
     assert_eq!(front(&scene, mirror).name(), "conductor");
-    assert_eq!(scene.materials.len(), 6, "the seventh of the file, mat_bars, is used by nothing");
+    assert_eq!(scene.appearances.len(), 6, "the seventh of the file, mat_bars, is used by nothing");
     let forward = Vec3::new(0.0, -0.25, -2.45).normalize();
     assert_near(scene.camera.to_world.transform_vector3(Vec3::Z), forward, "viewing direction");
     assert_near(scene.camera.to_world.transform_vector3(Vec3::X), Vec3::NEG_X, "left");
@@ -187,7 +187,7 @@ fn a_surface_without_bsdf_is_grey_and_black_where_it_emits() {
         .collect();
     assert_eq!(reflectances, [Vec3::splat(0.5), Vec3::ZERO]);
     assert!(scene.shapes.iter().all(|s| matches!(s.sides, Sides::One(_))));
-    assert_eq!(scene.shapes[1].emission, Some(Vec3::ONE));
+    assert_eq!(scene.shapes[1].emission, Some(Vec3::ONE.into()));
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn references_reach_forward_backward_and_into_shapes() {
     assert_eq!(names, ["diffuse", "conductor", "conductor", "diffuse"]);
     assert_eq!(scene.shapes[1].sides, scene.shapes[2].sides, "the same material is listed once");
     let Sides::Two { front, back } = scene.shapes[3].sides else { panic!("two sides") };
-    let sides = [front, back].map(|m| scene.materials[m as usize].name());
+    let sides = [front, back].map(|m| scene.appearances[m as usize].plain().unwrap().name());
     assert_eq!(sides, ["diffuse", "conductor"]);
 }
 
@@ -252,7 +252,7 @@ fn references_reach_forward_backward_and_into_shapes() {
 fn colours_are_one_number_or_three() {
     let radiance = |value: &str| {
         let text = format!("<shape type='rectangle'><emitter type='area'>{value}</emitter></shape>");
-        shape(&[], &text).emission.unwrap()
+        shape(&[], &text).emission.unwrap().mean()
     };
     for (value, expected) in [
         ("<rgb name='radiance' value='1, 2, 3'/>", Vec3::new(1.0, 2.0, 3.0)),
@@ -395,7 +395,8 @@ fn disks_keep_their_front_and_spheres_lose_it_when_mirrored_as_in_mitsuba() {
         ("-1, 1, 1", FLIP, -1.0, false),
         ("1, 1, -1", "", -1.0, true),
     ] {
-        let ShapeGeometry::Disk { normal, .. } = scaled("disk", scale, inner).geometry else { panic!("a disk") };
+        let ShapeGeometry::Disk { axes, .. } = scaled("disk", scale, inner).geometry else { panic!("a disk") };
+        let normal = axes.z_axis;
         assert_near(normal, Vec3::Z * expected_normal, &format!("disk {scale} {inner}"));
         let ShapeGeometry::Sphere { flipped, .. } = scaled("sphere", scale, inner).geometry else { panic!("a sphere") };
         assert_eq!(flipped, expected_flipped, "sphere {scale} {inner}");
@@ -425,12 +426,13 @@ fn a_cube_faces_outwards_even_if_mirrored() {
 fn spheres_and_disks_are_scaled_turned_and_moved() {
     let text = "<shape type='sphere'><point name='center' x='1' y='0' z='0'/><float name='radius' value='3'/>
         <transform name='to_world'><scale value='2'/><rotate z='1' angle='90'/><translate z='5'/></transform></shape>";
-    let ShapeGeometry::Sphere { center, radius, flipped } = shape(&[], text).geometry else { panic!("a sphere") };
+    let ShapeGeometry::Sphere { center, radius, flipped, .. } = shape(&[], text).geometry else { panic!("a sphere") };
     assert_near(center, Vec3::new(0.0, 2.0, 5.0), "centre");
     assert!((radius - 6.0).abs() < 1e-5 && !flipped);
     let text = "<shape type='disk'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/>
         <translate x='1'/></transform></shape>";
-    let ShapeGeometry::Disk { center, normal, radius } = shape(&[], text).geometry else { panic!("a disk") };
+    let ShapeGeometry::Disk { center, radius, axes } = shape(&[], text).geometry else { panic!("a disk") };
+    let normal = axes.z_axis;
     assert_near(center, Vec3::X, "centre");
     assert_near(normal, Vec3::NEG_Y, "normal");
     assert!((radius - 2.0).abs() < 1e-5);

@@ -104,6 +104,7 @@ const TAGS: &[Tag] = &[
     tag("sampler", Kind::Object, &["type"], &["id", "name"]),
     tag("sensor", Kind::Object, &["type"], &["id", "name"]),
     tag("shape", Kind::Object, &["type"], &["id", "name"]),
+    tag("texture", Kind::Object, &["type"], &["id", "name"]),
     tag("ref", Kind::Reference, &["id"], &["name"]),
     tag("boolean", Kind::Value, &["name", "value"], &[]),
     tag("float", Kind::Value, &["name", "value"], &[]),

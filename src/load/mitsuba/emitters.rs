@@ -2,13 +2,15 @@
 
 use super::document::Element;
 use super::parameters::ElementParameters;
+use super::textures::Textures;
 use crate::load::faults::Faults;
-use crate::scene::Rgb;
 use crate::scene::lights::{self, Light};
+use crate::scene::materials::Range;
 use crate::scene::parameters::Parameters;
+use crate::scene::textures::Varying;
 
 /// The emitter inside a shape.
-pub fn of_shape(element: &Element, faults: &Faults) -> Option<Rgb> {
+pub fn of_shape<'a>(element: &'a Element, textures: &'a Textures<'a>, faults: &'a Faults) -> Option<Varying> {
     let kind = element.value("type");
     if kind != "area" {
         let is_known = lights::KNOWN.contains(&kind);
@@ -20,16 +22,19 @@ pub fn of_shape(element: &Element, faults: &Faults) -> Option<Rgb> {
         }
         return None;
     }
-    let mut p = ElementParameters::new(element, faults);
-    let radiance = p.radiance("radiance", 1.0);
+    let mut p = ElementParameters::new(element, faults).with_textures(textures);
+    let radiance = match p.texture("radiance", Range::Radiance) {
+        Some(texture) => texture.map(Varying::Textured),
+        None => Some(Varying::Constant(p.radiance("radiance", 1.0))),
+    };
     p.finish();
-    Some(radiance)
+    radiance
 }
 
 /// An emitter directly inside the scene.
-pub fn of_scene(element: &Element, faults: &Faults) -> Option<Light> {
+pub fn of_scene<'a>(element: &'a Element, textures: &'a Textures<'a>, faults: &'a Faults) -> Option<Light> {
     let kind = element.value("type");
-    let mut p = ElementParameters::new(element, faults);
+    let mut p = ElementParameters::new(element, faults).with_textures(textures);
     let light = lights::read(kind, &mut p);
     if light.is_some() {
         p.finish();
@@ -38,7 +43,7 @@ pub fn of_scene(element: &Element, faults: &Faults) -> Option<Light> {
     } else {
         report_unknown(element, faults);
     }
-    light
+    light.flatten()
 }
 
 /// A type that is neither `area` nor a light.

@@ -28,6 +28,11 @@ impl<'a> Ids<'a> {
         }
     }
 
+    /// The tag of the element with that `id`.
+    pub fn tag_of(&self, id: &str) -> Option<&'static str> {
+        self.0.get(id).map(|element| element.tag)
+    }
+
     /// The element of the expected tag that a `ref` names.
     pub fn referred(&self, reference: &Element, tag: &str, faults: &Faults) -> Option<&'a Element> {
         let id = reference.attribute("id")?;

@@ -17,6 +17,7 @@ mod rfilters;
 mod samplers;
 mod sensors;
 mod shapes;
+mod textures;
 mod transforms;
 mod values;
 
@@ -30,6 +31,7 @@ use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
 pub use shapes::parse_ply;
+use textures::Textures;
 
 /// Reads the text of the scene file at `path`.
 pub fn read(path: &Path, text: String, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {
@@ -42,7 +44,8 @@ pub fn read(path: &Path, text: String, defines: &[(String, String)]) -> Result<S
 /// Reads the elements of the scene.
 fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDescription> {
     let ids = Ids::new(scene, faults);
-    let mut bsdfs = bsdfs::Library::new(&ids, faults);
+    let textures = Textures::new(scene, &ids, folder, faults);
+    let mut bsdfs = bsdfs::Library::new(&ids, &textures, faults);
     let mut p = ElementParameters::new(scene, faults);
 
     let integrator = match p.single("integrator") {
@@ -55,12 +58,15 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     }
     let view = sensor.and_then(|element| sensors::read(element, faults));
     let shape_elements = p.nested(&["shape"]);
-    let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, faults);
+    let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, &textures, faults);
     for element in p.nested(&["bsdf"]) {
         bsdfs.bsdf(element); // those that no shape uses have faults as well
     }
+    for element in p.nested(&["texture"]) {
+        textures.get(element);
+    }
     let light_elements = p.nested(&["emitter"]);
-    let lights = lights(&light_elements, faults);
+    let lights = lights(&light_elements, &textures, faults);
     let is_lit = !light_elements.is_empty() || shape_elements.iter().any(|shape| shape.children.iter().any(is_emitter));
     if !is_lit {
         faults.at(&scene.span, "nothing in the scene emits light: there is no <emitter>");
@@ -73,7 +79,7 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
         integrator: integrator?,
         camera,
         film,
-        materials: bsdfs.materials,
+        appearances: bsdfs.appearances,
         shapes,
         lights,
         warnings,
@@ -86,12 +92,12 @@ fn is_emitter(element: &Element) -> bool {
 }
 
 /// Emitters that are not part of shapes; only one of them can be all around.
-fn lights(elements: &[&Element], faults: &Faults) -> Vec<Light> {
+fn lights<'a>(elements: &[&'a Element], textures: &'a Textures<'a>, faults: &'a Faults) -> Vec<Light> {
     let mut lights = Vec::new();
     let mut is_surrounded = false;
     for element in elements {
-        let Some(light) = emitters::of_scene(element, faults) else { continue };
-        if matches!(light, Light::Constant(_)) && std::mem::replace(&mut is_surrounded, true) {
+        let Some(light) = emitters::of_scene(element, textures, faults) else { continue };
+        if light.is_surrounding() && std::mem::replace(&mut is_surrounded, true) {
             faults.at(&element.span, "the scene has more than one emitter that surrounds it");
         }
         lights.push(light);

@@ -1,14 +1,18 @@
 //! The named parameters and nested objects of one element.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine2, Affine3A, Mat2, Vec3};
 
 use super::document::{Element, Kind};
+use super::textures::Textures;
 use super::{transforms, values};
 use crate::load::faults::{Faults, did_you_mean, list};
 use crate::scene::Rgb;
+use crate::scene::materials::{Range, VaryingParameter};
 use crate::scene::parameters::{NumberOrName, Parameters};
+use crate::scene::textures::{Image, Texture};
 
 /// Reads an element; [`finish`](Self::finish) then reports all in it that nothing asked for.
 pub struct ElementParameters<'a> {
@@ -20,12 +24,66 @@ pub struct ElementParameters<'a> {
     asked: BTreeSet<String>,
     /// Tags of nested objects asked for.
     nested: BTreeSet<&'static str>,
+    /// Where textures and pictures come from, of elements that may have any.
+    textures: Option<&'a Textures<'a>>,
+    /// Parameters in whose place textures can be, and those that are.
+    varying: &'static [VaryingParameter],
+    textured: Vec<(usize, Arc<Texture>)>,
 }
 
 impl<'a> ElementParameters<'a> {
     /// Of an element.
     pub fn new(element: &'a Element, faults: &'a Faults) -> Self {
-        ElementParameters { element, faults, asked: BTreeSet::new(), nested: BTreeSet::new() }
+        ElementParameters {
+            element,
+            faults,
+            asked: BTreeSet::new(),
+            nested: BTreeSet::new(),
+            textures: None,
+            varying: &[],
+            textured: Vec::new(),
+        }
+    }
+
+    /// With textures and pictures.
+    pub fn with_textures(self, textures: &'a Textures<'a>) -> Self {
+        ElementParameters { textures: Some(textures), ..self }
+    }
+
+    /// With textures in the place of some parameters; [`textured`](Self::textured) then tells which.
+    pub fn with_varying(self, varying: &'static [VaryingParameter]) -> Self {
+        ElementParameters { varying, ..self }
+    }
+
+    /// The textures met in the place of parameters, by their numbers among those that vary.
+    pub fn textured(&mut self) -> Vec<(usize, Arc<Texture>)> {
+        std::mem::take(&mut self.textured)
+    }
+
+    /// Whether there is a child of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.child(name).is_some()
+    }
+
+    /// The texture in the place of a parameter; `None` where the parameter is something else or absent, `Some(None)`
+    /// where the texture is faulty.
+    pub fn texture(&mut self, name: &str, range: Range) -> Option<Option<Arc<Texture>>> {
+        let (textures, child) = (self.textures?, self.child(name)?);
+        if !textures.is_texture(child) {
+            return None;
+        }
+        self.asked.insert(name.into());
+        let texture = textures.get(child);
+        Some(texture.filter(|texture| {
+            let values = texture.range();
+            let checked = range.check(values);
+            if let Err(accepted) = checked {
+                let [least, largest] = values;
+                let message = format!("values of the texture run from {least} to {largest}; {name} must be {accepted}");
+                self.faults.at(&child.span, message);
+            }
+            checked.is_ok()
+        }))
     }
 
     /// The nested objects of some tags (`ref` for references), in order, but for those in the place of parameters
@@ -113,7 +171,17 @@ impl<'a> ElementParameters<'a> {
         if accepted.contains(&child.tag) {
             return Some(child);
         }
-        let accepted: Vec<_> = accepted.iter().map(|tag| format!("<{tag}>")).collect();
+        let slot = self.varying.iter().position(|parameter| parameter.name == name);
+        if let Some(slot) = slot
+            && let Some(texture) = self.texture(name, self.varying[slot].range)
+        {
+            if self.textured.iter().all(|(known, _)| *known != slot) {
+                self.textured.extend(texture.map(|texture| (slot, texture)));
+            }
+            return None;
+        }
+        let texture = slot.map(|_| "<texture>".to_string());
+        let accepted: Vec<_> = accepted.iter().map(|tag| format!("<{tag}>")).chain(texture).collect();
         let message = format!("{name:?} is given as <{}>; accepted: {}", child.tag, accepted.join(", "));
         self.faults.at(&child.span, message);
         None
@@ -173,6 +241,21 @@ impl Parameters for ElementParameters<'_> {
     fn to_world(&mut self) -> Affine3A {
         let read = self.value("to_world", &["transform"]).and_then(|child| transforms::read(child, self.faults));
         read.unwrap_or(Affine3A::IDENTITY)
+    }
+
+    fn to_uv(&mut self) -> Affine2 {
+        let read = self.value("to_uv", &["transform"]).and_then(|child| transforms::read(child, self.faults));
+        let Some(Affine3A { matrix3, translation }) = read else { return Affine2::IDENTITY };
+        Affine2 {
+            matrix2: Mat2::from_cols(matrix3.x_axis.truncate(), matrix3.y_axis.truncate()),
+            translation: translation.truncate(),
+        }
+    }
+
+    fn image(&mut self, name: &str) -> Option<Arc<Image>> {
+        let file = self.required_string(name)?;
+        let textures = self.textures.expect("elements that name pictures are read with them");
+        textures.image(&file).map_err(|message| Parameters::fault(self, name, message)).ok()
     }
 
     fn fault(&mut self, name: &str, message: String) {

@@ -32,8 +32,8 @@ impl Emit for Constant {
         self.radiance * (4.0 * PI * PI * scene_radius * scene_radius)
     }
 
-    fn value(&self) -> Rgb {
-        self.radiance
+    fn largest(&self) -> f32 {
+        self.radiance.max_element()
     }
 
     #[inline(always)]

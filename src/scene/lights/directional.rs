@@ -38,8 +38,8 @@ impl Emit for Directional {
         self.irradiance * (PI * scene_radius * scene_radius)
     }
 
-    fn value(&self) -> Rgb {
-        self.irradiance
+    fn largest(&self) -> f32 {
+        self.irradiance.max_element()
     }
 
     #[inline(always)]

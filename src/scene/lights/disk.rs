@@ -2,27 +2,28 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Mat3, Vec2, Vec3};
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
     math::{Frame, warp},
-    scene::Rgb,
+    scene::{Rgb, parametrisation::disk_uv, textures::Varying},
 };
 
 /// The front of a disk, uniform over its area.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Disk {
     center: Vec3,
     frame: Frame,
     radius: f32,
-    radiance: Rgb,
+    axes: Mat3,
+    radiance: Varying,
 }
 
 impl Disk {
-    /// The disk around `center` whose front is where the unit vector `normal` points.
-    pub fn new(center: Vec3, normal: Vec3, radius: f32, radiance: Rgb) -> Disk {
-        Disk { center, frame: Frame::new(normal), radius, radiance }
+    /// The disk around `center` with those orthonormal axes; its front is where the third one points.
+    pub fn new(center: Vec3, radius: f32, axes: Mat3, radiance: Varying) -> Disk {
+        Disk { center, frame: Frame::new(axes.z_axis), radius, axes, radiance }
     }
 
     fn pdf_area(&self) -> f32 {
@@ -32,18 +33,24 @@ impl Disk {
 
 impl Emit for Disk {
     fn power(&self, _scene_radius: f32) -> Rgb {
-        self.radiance * (PI * PI * self.radius * self.radius)
+        self.radiance.mean() * (PI * PI * self.radius * self.radius)
     }
 
-    fn value(&self) -> Rgb {
-        self.radiance
+    fn largest(&self) -> f32 {
+        self.radiance.largest()
+    }
+
+    #[inline(always)]
+    fn radiance(&self, uv: Vec2) -> Rgb {
+        self.radiance.at(|| uv)
     }
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let d = warp::disk(u) * self.radius;
-        let q = self.center + self.frame.s * d.x + self.frame.t * d.y;
-        towards(p, ng, q, [self.frame.n; 2], self.radiance, self.pdf_area())
+        let from_centre = self.frame.s * d.x + self.frame.t * d.y;
+        let radiance = self.radiance.at(|| disk_uv(&self.axes, self.radius, from_centre));
+        towards(p, ng, self.center + from_centre, [self.frame.n; 2], radiance, self.pdf_area())
     }
 
     #[inline(always)]

@@ -2,12 +2,12 @@
 
 use std::{f32::consts::PI, sync::Arc};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
     math::warp,
-    scene::{Mesh, Rgb},
+    scene::{Mesh, Rgb, textures::Varying},
 };
 
 /// The front of a mesh, uniform over its area.
@@ -17,7 +17,7 @@ pub struct MeshLight {
     /// Upper ends of the triangles' shares of [0, 1], in proportion to area.
     cumulative: Vec<f32>,
     inverse_area: f32,
-    radiance: Rgb,
+    radiance: Varying,
 }
 
 impl PartialEq for MeshLight {
@@ -28,7 +28,7 @@ impl PartialEq for MeshLight {
 
 impl MeshLight {
     /// The mesh as a light; it has some area.
-    pub fn new(mesh: Arc<Mesh>, radiance: Rgb) -> MeshLight {
+    pub fn new(mesh: Arc<Mesh>, radiance: Varying) -> MeshLight {
         let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
         let total: f64 = areas.iter().sum();
         let mut sum = 0.0;
@@ -45,10 +45,10 @@ impl MeshLight {
         MeshLight { mesh, cumulative, inverse_area: (1.0 / total) as f32, radiance }
     }
 
-    /// A point with the geometric and the shading normal there. The first number also chooses the triangle, so that
+    /// A point with the geometric and the shading normal there and the radiance. The first number also chooses the triangle, so that
     /// near numbers give near points of one triangle.
     #[inline(always)]
-    fn point(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2]) {
+    fn point(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
         let triangle = self.cumulative.partition_point(|&end| end <= u[0]).min(self.cumulative.len() - 1);
         let start = if triangle == 0 { 0.0 } else { self.cumulative[triangle - 1] };
         let within = ((u[0] - start) / (self.cumulative[triangle] - start)).clamp(0.0, 1.0);
@@ -56,23 +56,29 @@ impl MeshLight {
         let [p0, p1, p2] = self.mesh.corners(triangle as u32);
         let (e1, e2) = (p1 - p0, p2 - p0);
         let n = e1.cross(e2).normalize();
-        (p0 + e1 * b + e2 * c, [n, self.mesh.shading_normal(triangle as u32, b, c, n)])
+        let normals = [n, self.mesh.shading_normal(triangle as u32, b, c, n)];
+        (p0 + e1 * b + e2 * c, normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
     }
 }
 
 impl Emit for MeshLight {
     fn power(&self, _scene_radius: f32) -> Rgb {
-        self.radiance * (PI / self.inverse_area)
+        self.radiance.mean() * (PI / self.inverse_area)
     }
 
-    fn value(&self) -> Rgb {
-        self.radiance
+    fn largest(&self) -> f32 {
+        self.radiance.largest()
+    }
+
+    #[inline(always)]
+    fn radiance(&self, uv: Vec2) -> Rgb {
+        self.radiance.at(|| uv)
     }
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (q, normals) = self.point(u);
-        towards(p, ng, q, normals, self.radiance, self.inverse_area)
+        let (q, normals, radiance) = self.point(u);
+        towards(p, ng, q, normals, radiance, self.inverse_area)
     }
 
     #[inline(always)]

@@ -9,6 +9,7 @@
 mod constant;
 mod directional;
 mod disk;
+mod envmap;
 mod mesh;
 mod point;
 mod sphere;
@@ -17,12 +18,13 @@ mod spot;
 pub use constant::Constant;
 pub use directional::Directional;
 pub use disk::Disk;
+pub use envmap::Envmap;
 pub use mesh::MeshLight;
 pub use point::Point;
 pub use sphere::Sphere;
 pub use spot::Spot;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{
     Profile, Rgb,
@@ -53,13 +55,18 @@ const SHORT_OF_LIGHT: f32 = 0.9999;
 trait Emit {
     /// Emitted power in W, up to the unit of the scene, per channel; `scene_radius` is that of a sphere around it.
     fn power(&self, scene_radius: f32) -> Rgb;
-    /// The largest radiance, intensity or irradiance it can show, per channel.
-    fn value(&self) -> Rgb;
+    /// The largest channel of any radiance, intensity or irradiance it can show.
+    fn largest(&self) -> f32;
+    /// Radiance of the place with those surface coordinates, of what rays can hit.
+    #[inline(always)]
+    fn radiance(&self, _uv: Vec2) -> Rgb {
+        Rgb::ZERO
+    }
     /// Samples a direction to it from the surface point `p` with geometric normal `ng`; `None` where the chosen place
     /// does not shine to `p`.
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample>;
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal `n`
-    /// on it, with respect to solid angle at `origin`; for lights at infinity, to any direction.
+    /// on it, with respect to solid angle at `origin`; for lights at infinity, in the direction `q` from anywhere.
     fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32;
 }
 
@@ -93,6 +100,16 @@ macro_rules! registry {
                 }
             }
 
+            /// Radiance of the place with those surface coordinates, of a surface.
+            #[inline(always)]
+            pub fn radiance<P: Profile>(&self, uv: Vec2) -> Rgb {
+                match self {
+                    Light::MeshLight(light) => light.radiance(uv),
+                    _ if P::FLAT_MESHES => unreachable!("a profile with lights on flat meshes only"),
+                    $(Light::$kind(light) => light.radiance(uv)),+
+                }
+            }
+
             /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with
             /// normal `n` on the light, with respect to solid angle at `origin`.
             #[inline(always)]
@@ -108,20 +125,23 @@ macro_rules! registry {
 }
 
 // meshes are in every profile; the others only where a scene has any
-registry! { Constant, Directional, Disk, Point, Sphere, Spot }
+registry! { Constant, Directional, Disk, Envmap, Point, Sphere, Spot }
 
 /// Names that [`read`] knows, as scene files use them. (`area` is a property of shapes.)
-pub const KNOWN: &[&str] = &["constant", "directional", "point", "spot"];
+pub const KNOWN: &[&str] = &["constant", "directional", "envmap", "point", "spot"];
 
-/// Reads the light of that name; `None` where the name is not [`KNOWN`].
-pub fn read(name: &str, parameters: &mut dyn Parameters) -> Option<Light> {
-    match name {
-        "constant" => Some(Light::Constant(Constant::read(parameters))),
-        "directional" => Some(Light::Directional(Directional::read(parameters))),
-        "point" => Some(Light::Point(Point::read(parameters))),
-        "spot" => Some(Light::Spot(Spot::read(parameters))),
-        _ => None,
-    }
+/// Reads the light of that name: `None` where the name is not [`KNOWN`], `Some(None)` after a fault without which there
+/// is no light.
+pub fn read(name: &str, parameters: &mut dyn Parameters) -> Option<Option<Light>> {
+    let light = match name {
+        "constant" => Light::Constant(Constant::read(parameters)),
+        "directional" => Light::Directional(Directional::read(parameters)),
+        "envmap" => return Some(Envmap::read(parameters).map(Light::Envmap)),
+        "point" => Light::Point(Point::read(parameters)),
+        "spot" => Light::Spot(Spot::read(parameters)),
+        _ => return None,
+    };
+    Some(Some(light))
 }
 
 impl Light {
@@ -130,24 +150,35 @@ impl Light {
         self.as_emit().power(scene_radius)
     }
 
-    /// The largest radiance (intensity, for points) it can show.
-    #[inline(always)]
-    pub fn value(&self) -> Rgb {
+    /// The largest channel of any radiance, intensity or irradiance it can show.
+    pub fn largest(&self) -> f32 {
+        self.as_emit().largest()
+    }
+
+    /// Whether it is infinitely far away in all directions, so that what leaves the scene meets it.
+    pub fn is_surrounding(&self) -> bool {
+        matches!(self, Light::Constant(_) | Light::Envmap(_))
+    }
+
+    /// Radiance that comes from the direction `d`, of a light that [surrounds](Light::is_surrounding) the scene.
+    #[inline]
+    pub fn radiance_from(&self, d: Vec3) -> Rgb {
         match self {
-            Light::MeshLight(light) => light.value(),
-            other => other.as_emit().value(),
+            Light::Constant(light) => light.radiance,
+            Light::Envmap(light) => light.radiance_from(d),
+            _ => Rgb::ZERO,
         }
     }
 
     /// The light that an emitting surface is.
     pub fn of_shape(shape: &ShapeDescription) -> Option<Light> {
-        let radiance = shape.emission?;
+        let radiance = shape.emission.clone()?;
         Some(match &shape.geometry {
             ShapeGeometry::Mesh(mesh) => Light::MeshLight(MeshLight::new(mesh.clone(), radiance)),
-            &ShapeGeometry::Sphere { center, radius, flipped } => {
-                Light::Sphere(Sphere { center, radius, flipped, radiance })
+            &ShapeGeometry::Sphere { center, radius, axes, flipped } => {
+                Light::Sphere(Sphere { center, radius, axes, flipped, radiance })
             }
-            &ShapeGeometry::Disk { center, normal, radius } => Light::Disk(Disk::new(center, normal, radius, radiance)),
+            &ShapeGeometry::Disk { center, radius, axes } => Light::Disk(Disk::new(center, radius, axes, radiance)),
         })
     }
 }

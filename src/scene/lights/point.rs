@@ -30,8 +30,8 @@ impl Emit for Point {
         self.intensity * (4.0 * PI)
     }
 
-    fn value(&self) -> Rgb {
-        self.intensity
+    fn largest(&self) -> f32 {
+        self.intensity.max_element()
     }
 
     #[inline(always)]

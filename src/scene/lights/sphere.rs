@@ -2,26 +2,28 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{Mat3, Vec2, Vec3};
 
 use super::{Emit, LightSample, SHORT_OF_LIGHT, origin_towards, per_solid_angle, towards};
 use crate::{
     math::{Frame, warp},
-    scene::Rgb,
+    scene::{Rgb, parametrisation::sphere_uv, textures::Varying},
 };
 
 /// A sphere that emits from its outside (from its inside, if flipped): uniform over the solid angle under which it is
 /// seen from outside, uniform over its area from inside. Source: Shirley, Wang & Zimmerman 1996, section 3.2.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre.
     pub center: Vec3,
     /// Radius, > 0.
     pub radius: f32,
+    /// Its own axes, which surface coordinates refer to.
+    pub axes: Mat3,
     /// The front is the inside.
     pub flipped: bool,
     /// Radiance, W/(m² sr) per channel.
-    pub radiance: Rgb,
+    pub radiance: Varying,
 }
 
 impl Sphere {
@@ -40,11 +42,16 @@ impl Sphere {
 
 impl Emit for Sphere {
     fn power(&self, _scene_radius: f32) -> Rgb {
-        self.radiance * (4.0 * PI * PI * self.radius * self.radius)
+        self.radiance.mean() * (4.0 * PI * PI * self.radius * self.radius)
     }
 
-    fn value(&self) -> Rgb {
-        self.radiance
+    fn largest(&self) -> f32 {
+        self.radiance.largest()
+    }
+
+    #[inline(always)]
+    fn radiance(&self, uv: Vec2) -> Rgb {
+        self.radiance.at(|| uv)
     }
 
     #[inline(always)]
@@ -53,7 +60,8 @@ impl Emit for Sphere {
         let Some(one_minus_cos) = self.one_minus_cos(towards_center) else {
             let n = warp::sphere(u);
             let front = if self.flipped { -n } else { n };
-            return towards(p, ng, self.center + n * self.radius, [front; 2], self.radiance, self.pdf_area());
+            let radiance = self.radiance.at(|| sphere_uv(&self.axes, n));
+            return towards(p, ng, self.center + n * self.radius, [front; 2], radiance, self.pdf_area());
         };
         if self.flipped {
             return None; // the outside does not shine
@@ -65,8 +73,10 @@ impl Emit for Sphere {
         let along = to.dot(wi);
         let half_chord = (self.radius * self.radius - (to - wi * along).length_squared()).max(0.0).sqrt();
         let pdf = 1.0 / (TAU * one_minus_cos);
-        let tfar = (along - half_chord) * SHORT_OF_LIGHT;
-        Some(LightSample { origin, wi, tfar, weight: self.radiance / pdf, pdf })
+        let distance = along - half_chord;
+        let outside = || (wi * distance - to).normalize_or(-wi);
+        let radiance = self.radiance.at(|| sphere_uv(&self.axes, outside()));
+        Some(LightSample { origin, wi, tfar: distance * SHORT_OF_LIGHT, weight: radiance / pdf, pdf })
     }
 
     #[inline(always)]

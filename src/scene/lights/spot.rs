@@ -66,8 +66,8 @@ impl Emit for Spot {
         self.point.intensity * (std::f32::consts::TAU * (1.0 - 0.5 * (self.cos_beam + self.cos_cutoff)))
     }
 
-    fn value(&self) -> Rgb {
-        self.point.intensity
+    fn largest(&self) -> f32 {
+        self.point.intensity.max_element()
     }
 
     #[inline(always)]

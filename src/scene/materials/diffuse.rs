@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample};
+use super::{Evaluation, Lobes, Range, Scatter, ScatterSample, VaryingParameter};
 use crate::{
     math::warp,
     scene::{Rgb, parameters::Parameters},
@@ -16,6 +16,13 @@ pub struct Diffuse {
 }
 
 impl Scatter for Diffuse {
+    const VARYING: &'static [VaryingParameter] = &[VaryingParameter { name: "reflectance", range: Range::Reflectance }];
+
+    #[inline]
+    fn put(&mut self, _reflectance: usize, value: Rgb) {
+        self.reflectance = value;
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, ..Lobes::NONE }
     }

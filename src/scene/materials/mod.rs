@@ -11,6 +11,7 @@ mod dielectric;
 mod diffuse;
 mod fresnel;
 mod microfacets;
+mod null;
 mod plastic;
 mod roughconductor;
 mod roughdielectric;
@@ -25,6 +26,7 @@ pub use conductor::Conductor;
 pub(crate) use conductor::PRESETS as CONDUCTORS;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
+pub use null::Null;
 pub use plastic::Plastic;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
@@ -70,17 +72,41 @@ pub struct Lobes {
     pub delta_reflection: bool,
     /// Perfect refraction.
     pub delta_transmission: bool,
+    /// Some light passes as if nothing were there.
+    pub straight: bool,
 }
 
 impl Lobes {
     /// None at all.
-    pub const NONE: Lobes =
-        Lobes { smooth: false, smooth_transmission: false, delta_reflection: false, delta_transmission: false };
+    pub const NONE: Lobes = Lobes {
+        smooth: false,
+        smooth_transmission: false,
+        delta_reflection: false,
+        delta_transmission: false,
+        straight: false,
+    };
 
     /// Whether choosing among the lobes takes a primary dimension of its own.
     pub fn need_choice(self) -> bool {
-        let lobes = [self.smooth, self.smooth_transmission, self.delta_reflection, self.delta_transmission];
+        let Lobes { smooth, smooth_transmission, delta_reflection, delta_transmission, straight } = self;
+        let lobes = [smooth, smooth_transmission, delta_reflection, delta_transmission, straight];
         lobes.into_iter().map(u8::from).sum::<u8>() > 1
+    }
+
+    /// Those of either.
+    pub fn or(self, other: Lobes) -> Lobes {
+        Lobes {
+            smooth: self.smooth || other.smooth,
+            smooth_transmission: self.smooth_transmission || other.smooth_transmission,
+            delta_reflection: self.delta_reflection || other.delta_reflection,
+            delta_transmission: self.delta_transmission || other.delta_transmission,
+            straight: self.straight || other.straight,
+        }
+    }
+
+    /// Whether some of them are perfect, so that no other technique can hit them.
+    pub fn has_delta(self) -> bool {
+        self.delta_reflection || self.delta_transmission || self.straight
     }
 
     /// The lobes there are, one short phrase each.
@@ -90,18 +116,62 @@ impl Lobes {
             (self.smooth_transmission, "smooth transmission"),
             (self.delta_reflection, "perfect reflection"),
             (self.delta_transmission, "perfect refraction"),
+            (self.straight, "straight passage"),
         ];
         named.into_iter().filter(|(there, _)| *there).map(|(_, name)| name).collect()
     }
 
     /// Whether light passes through.
     pub fn transmit(self) -> bool {
-        self.smooth_transmission || self.delta_transmission
+        self.smooth_transmission || self.delta_transmission || self.straight
+    }
+}
+
+/// A parameter in whose place a texture can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VaryingParameter {
+    /// Its name.
+    pub name: &'static str,
+    /// What values it takes.
+    pub range: Range,
+}
+
+/// What values a parameter takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Colours with channels within 0…1.
+    Reflectance,
+    /// Numbers within 0…1; of a texture, its luminance.
+    Fraction,
+    /// Numbers that are not negative; of a texture, its luminance.
+    Roughness,
+    /// Colours with channels that are not negative.
+    Radiance,
+}
+
+impl Range {
+    /// Whether values from `least` to `largest` are within; in words, what would be, where they are not.
+    pub fn check(self, [least, largest]: [f32; 2]) -> Result<(), &'static str> {
+        let (is_within, accepted) = match self {
+            Range::Reflectance | Range::Fraction => (least >= 0.0 && largest <= 1.0, "0 to 1"),
+            Range::Roughness | Range::Radiance => (least >= 0.0, "not negative"),
+        };
+        if is_within { Ok(()) } else { Err(accepted) }
     }
 }
 
 /// A scattering function.
 pub trait Scatter: Copy {
+    /// The parameters that may vary over a surface.
+    const VARYING: &'static [VaryingParameter] = &[];
+    /// Gives parameter number `i` of [`VARYING`](Scatter::VARYING) another value. Called at hits, so it must be quick.
+    fn put(&mut self, i: usize, _value: Rgb) {
+        unreachable!("parameter {i} of {}", std::any::type_name::<Self>());
+    }
+    /// Whether directions round the normal are not all alike, so that the frame's x axis must lie along ∂p/∂u.
+    fn needs_tangents(&self) -> bool {
+        false
+    }
     /// Its lobes.
     fn lobes(&self) -> Lobes;
     /// Samples a direction from two primary samples for the lobe's shape and one for the choice of the lobe.
@@ -133,7 +203,26 @@ macro_rules! registry {
             }
         }
 
+        /// The parameters in whose place textures can be, of the material of that name.
+        pub fn varying(name: &str) -> &'static [VaryingParameter] {
+            match name {
+                $($name => $material::VARYING,)+
+                _ => &[],
+            }
+        }
+
         impl Material {
+            /// Gives the parameter of that number in [`varying`] another value.
+            #[inline]
+            pub fn put(&mut self, parameter: usize, value: Rgb) {
+                match self { $(Material::$material(m) => m.put(parameter, value)),+ }
+            }
+
+            /// See [`Scatter::needs_tangents`].
+            pub fn needs_tangents(&self) -> bool {
+                match self { $(Material::$material(m) => m.needs_tangents()),+ }
+            }
+
             /// The name of its kind.
             pub fn name(&self) -> &'static str {
                 match self { $(Material::$material(_) => $name),+ }
@@ -170,6 +259,7 @@ registry! {
     "conductor" => Conductor,
     "dielectric" => Dielectric,
     "diffuse" => Diffuse,
+    "null" => Null,
     "plastic" => Plastic,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,

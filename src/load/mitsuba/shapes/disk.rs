@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::super::parameters::ElementParameters;
 use super::Build;
@@ -28,6 +28,8 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
     let upright = x.cross(y).normalize();
     let is_mirrored = to_world.matrix3.determinant() < 0.0;
     let normal = if is_mirrored != flip_normals { -upright } else { upright };
-    let geometry = ShapeGeometry::Disk { center: to_world.translation.into(), normal, radius };
+    let x = x / radius;
+    let axes = Mat3::from_cols(x, (y - x * x.dot(y)).normalize(), normal);
+    let geometry = ShapeGeometry::Disk { center: to_world.translation.into(), radius, axes };
     Some(Box::new(move || Ok(geometry.into())))
 }

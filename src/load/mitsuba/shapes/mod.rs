@@ -20,10 +20,11 @@ use super::document::Element;
 use super::emitters;
 use super::parameters::ElementParameters;
 use super::registry::Registry;
+use super::textures::Textures;
 use crate::load::faults::{Faults, Span};
-use crate::scene::Rgb;
 use crate::scene::description::{ShapeDescription, ShapeGeometry, Sides};
 use crate::scene::parameters::Parameters;
+use crate::scene::textures::Varying;
 use mesh::{Placement, Repairs};
 
 pub use mesh::RawMesh;
@@ -62,7 +63,7 @@ struct Pending {
     /// Where faults of the geometry are shown.
     span: Span,
     /// Sides and emission, unless one of them is faulty.
-    parts: Option<(Sides, Option<Rgb>)>,
+    parts: Option<(Sides, Option<Varying>)>,
     build: Build,
 }
 
@@ -71,9 +72,11 @@ pub fn read<'a>(
     elements: &[&'a Element],
     folder: &Path,
     bsdfs: &mut Library<'a>,
+    textures: &'a Textures<'a>,
     faults: &'a Faults,
 ) -> Option<(Vec<ShapeDescription>, Vec<String>)> {
-    let pending: Vec<_> = elements.iter().enumerate().map(|(i, e)| pending(i, e, folder, bsdfs, faults)).collect();
+    let pending: Vec<_> =
+        elements.iter().enumerate().map(|(i, e)| pending(i, e, folder, bsdfs, textures, faults)).collect();
     let built: Vec<_> =
         pending.into_par_iter().map(|shape| shape.map(|s| (s.name, s.span, s.parts, (s.build)()))).collect();
 
@@ -100,6 +103,7 @@ fn pending<'a>(
     element: &'a Element,
     folder: &Path,
     bsdfs: &mut Library<'a>,
+    textures: &'a Textures<'a>,
     faults: &'a Faults,
 ) -> Option<Pending> {
     let mut p = ElementParameters::new(element, faults);
@@ -109,7 +113,7 @@ fn pending<'a>(
         faults.at(&surplus.span, "the shape has more than one <bsdf>");
     }
     let emitter = p.single("emitter");
-    let emission = emitter.map(|emitter| emitters::of_shape(emitter, faults));
+    let emission = emitter.map(|emitter| emitters::of_shape(emitter, textures, faults));
     let sides = match surface.first() {
         Some(surface) => bsdfs.sides(surface),
         None if emitter.is_some() => Some(bsdfs.bare_sides(Bare::Black)),
