@@ -307,3 +307,108 @@ impl Scattering<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+    use crate::scene::{
+        FullProfile, Rgb,
+        materials::{Conductor, Diffuse, Lobes},
+        textures::Bitmap,
+    };
+
+    const FRAME: Frame = Frame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z };
+
+    fn place(u: f32, v: f32) -> Place {
+        Place { uv: Vec2::new(u, v), du: Vec3::X, dv: Vec3::Y }
+    }
+
+    fn diffuse(reflectance: f32) -> Appearance {
+        Material::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) }).into()
+    }
+
+    fn mirror() -> Appearance {
+        let mirror = Conductor::examples().pop().expect("a mirror of reflectance 0.9");
+        Material::Conductor(mirror).into()
+    }
+
+    /// Left half 0, right half 1, nearly.
+    fn halves() -> ShareValue {
+        let texels = (0..64).map(|i| [f32::from(u8::from(i >= 32)); 3]).collect();
+        ShareValue::Textured(Arc::new(Texture::Bitmap(Bitmap::of_texels(64, 1, texels))))
+    }
+
+    fn at(appearance: &Appearance, u: f32) -> Mixture {
+        appearance.at(&place(u, 0.5), &FRAME, Vec3::Z, Vec3::Z)
+    }
+
+    /// Mean weight of samples over a grid: what is reflected of light from everywhere, and the part that goes straight on.
+    fn means(mixture: &Mixture, wo: Vec3) -> [f32; 2] {
+        let n = 24;
+        let scattering = Scattering::Mixed(mixture.clone());
+        let (mut all, mut straight) = (0.0, 0.0);
+        for i in 0..n * n * n {
+            let [u, v, choice] = [i % n, i / n % n, i / n / n].map(|k| (k as f32 + 0.5) / n as f32);
+            let Some(sample) = scattering.sample::<FullProfile>(wo, [u, v], choice) else { continue };
+            all += sample.weight.x;
+            straight += if sample.wi == -wo { sample.weight.x } else { 0.0 };
+        }
+        [all, straight].map(|sum| sum / (n * n * n) as f32)
+    }
+
+    #[test]
+    fn mixtures_reflect_what_their_parts_do() {
+        let wo = Vec3::new(0.6, 0.0, 0.8);
+        let blend = diffuse(0.5).blend(mirror(), ShareValue::Constant(0.25));
+        let [all, _] = means(&at(&blend, 0.0), wo);
+        assert!((all - (0.75 * 0.5 + 0.25 * 0.9)).abs() < 2e-3, "{all}");
+        let nested = blend.masked(ShareValue::Constant(0.25)).blend(diffuse(1.0), ShareValue::Constant(0.5));
+        assert_eq!(nested.parts().len(), 4);
+        let [all, straight] = means(&at(&nested, 0.0), wo);
+        assert!((straight - 0.5 * 0.75).abs() < 0.03, "{straight}");
+        assert!((all - (0.5 * (0.75 + 0.25 * 0.6) + 0.5)).abs() < 4e-3, "{all}");
+    }
+
+    #[test]
+    fn values_and_densities_are_weighted_sums() {
+        let (wo, wi) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.6, 0.8));
+        let blend = diffuse(0.5).blend(diffuse(0.9), ShareValue::Constant(0.25));
+        let value = at(&blend, 0.0).evaluate(wo, wi);
+        let cos = 0.8 * std::f32::consts::FRAC_1_PI;
+        assert!((value.value.x - 0.6 * cos).abs() < 1e-6 && (value.pdf - cos).abs() < 1e-6, "{value:?}");
+        let masked = diffuse(0.5).masked(ShareValue::Constant(0.25));
+        let value = at(&masked, 0.0).evaluate(wo, wi);
+        assert!((value.value.x - 0.125 * cos).abs() < 1e-6 && (value.pdf - 0.25 * cos).abs() < 1e-6, "{value:?}");
+    }
+
+    #[test]
+    fn weights_follow_their_texture() {
+        let blend = diffuse(0.2).blend(diffuse(0.8), halves());
+        let albedo = |u: f32| means(&at(&blend, u), Vec3::Z)[0];
+        assert!((albedo(0.25) - 0.2).abs() < 1e-3 && (albedo(0.75) - 0.8).abs() < 1e-3);
+        assert_eq!(at(&blend, 0.25).0.len(), 1, "parts without weight are left out");
+    }
+
+    #[test]
+    fn parameters_follow_their_texture() {
+        let ShareValue::Textured(texture) = halves() else { unreachable!() };
+        let material = Material::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) });
+        let textured = Appearance::from(Part { textures: vec![(0, texture)], ..Part::from(material) });
+        assert!(textured.plain().is_none());
+        assert_eq!([0.25, 0.75].map(|u| means(&at(&textured, u), Vec3::Z)[0]), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn weights_of_nothing_and_of_all_leave_one_part() {
+        for (weight, reflectance) in [(0.0, 0.2), (1.0, 0.8)] {
+            let blend = diffuse(0.2).blend(diffuse(0.8), ShareValue::Constant(weight));
+            let Some(Material::Diffuse(only)) = blend.plain() else { panic!("{blend:?}") };
+            assert_eq!(only.reflectance.x, reflectance);
+        }
+        assert!(diffuse(0.2).masked(ShareValue::Constant(1.0)).plain().is_some());
+        let nothing = diffuse(0.2).masked(ShareValue::Constant(0.0));
+        assert_eq!(nothing.lobes(), Lobes { straight: true, ..Lobes::NONE });
+    }
+}

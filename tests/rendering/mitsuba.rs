@@ -17,7 +17,7 @@ fn check(names: &[&str]) {
 
 #[test]
 fn materials_are_what_mitsuba_makes_of_them() {
-    check(&["gold", "glass", "twosided", "pane", "plastics"]);
+    check(&["gold", "glass", "twosided", "pane", "plastics", "mixtures"]);
 }
 
 #[test]
@@ -26,8 +26,13 @@ fn rough_materials_are_what_mitsuba_makes_of_them() {
 }
 
 #[test]
+fn textures_are_what_mitsuba_makes_of_them() {
+    check(&["textures", "relief", "picture-lights"]);
+}
+
+#[test]
 fn lights_are_what_mitsuba_makes_of_them() {
-    check(&["point", "spots", "constant", "sphere-light", "disk-light"]);
+    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light"]);
 }
 
 #[test]
