@@ -105,6 +105,17 @@ impl Texture {
         placed
     }
 
+    /// The same with pictures linear between the centres of their pixels, which is what has slopes; and whether that
+    /// changes anything.
+    pub fn smooth(self) -> (Texture, bool) {
+        match self {
+            Texture::Picture(picture) if picture.is_nearest => {
+                (Texture::Picture(Picture { is_nearest: false, ..picture }), true)
+            }
+            other => (other, false),
+        }
+    }
+
     /// Applies a function to every value.
     pub fn map(&self, files: &Files, f: &dyn Fn(Rgb) -> Rgb) -> Result<Texture, String> {
         Ok(match self {

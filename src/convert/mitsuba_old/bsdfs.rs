@@ -345,10 +345,17 @@ fn bumpmap(p: &Parameters) -> Element {
     let factor = p.float("scale").unwrap_or(1.0);
     let (texture, surface) = texture_and_surface(p);
     match texture.and_then(|texture| textures::with_factor(texture, p.context)) {
-        Some((texture, inner)) => Element::plugin("bsdf", "bumpmap")
-            .holding(texture.element("heights", Use::Number, p.context.files))
-            .float("scale", factor * inner)
-            .holding(surface),
+        Some((texture, inner)) => {
+            let (heights, was_nearest) = texture.smooth();
+            if was_nearest {
+                let message = "the picture of heights is linear between its pixels: squares have no slope";
+                p.context.notes.changed(p.node.place_of("type"), message);
+            }
+            Element::plugin("bsdf", "bumpmap")
+                .holding(heights.element("heights", Use::Number, p.context.files))
+                .float("scale", factor * inner)
+                .holding(surface)
+        }
         None => surface,
     }
 }

@@ -7,20 +7,15 @@ use super::parameters::{Parameters, Row, same};
 use crate::convert::xml::Element;
 use crate::load::faults::{did_you_mean, list};
 
-const CAMERA: &[Row] = &[
-    same("to_world", Transform),
-    same("near_clip", Float),
-    same("far_clip", Float),
-    same("principal_point_offset_x", Float),
-    same("principal_point_offset_y", Float),
-];
+const CAMERA: &[Row] = &[same("to_world", Transform), same("near_clip", Float), same("far_clip", Float)];
+const OFFSET: &[Row] = &[same("principal_point_offset_x", Float), same("principal_point_offset_y", Float)];
 const VIEW: &[Row] = &[same("fov", Float), same("fov_axis", String), same("focal_length", String)];
 const LENS: &[Row] = &[same("aperture_radius", Float), same("focus_distance", Float)];
 
 /// Sensors: the old name, the new one, and what each takes.
 const SENSORS: &[(&str, &str, &[&[Row]])] = &[
-    ("perspective", "perspective", &[CAMERA, VIEW]),
-    ("perspective_rdist", "perspective", &[CAMERA, VIEW]),
+    ("perspective", "perspective", &[CAMERA, VIEW, OFFSET]),
+    ("perspective_rdist", "perspective", &[CAMERA, VIEW, OFFSET]),
     ("thinlens", "thinlens", &[CAMERA, VIEW, LENS]),
     ("orthographic", "orthographic", &[CAMERA]),
 ];

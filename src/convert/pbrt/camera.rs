@@ -115,6 +115,11 @@ impl Converter<'_> {
         sensor = sensor.float("far_clip", FAR);
         // positive ones look to the right and down
         let offset = [(left + right) / 2.0 / (right - left), -(bottom + top) / 2.0 / (top - bottom)];
+        if lens > 0.0 && offset.iter().any(|offset| offset.abs() > 1e-6) {
+            let message = "the window's distance from the axis: Mitsuba's cameras with a lens look straight ahead";
+            self.notes.left_out(camera.place_of("screenwindow"), message);
+            return sensor;
+        }
         for (name, offset) in ["principal_point_offset_x", "principal_point_offset_y"].into_iter().zip(offset) {
             if offset.abs() > 1e-6 {
                 sensor = sensor.float(name, offset);

@@ -96,6 +96,11 @@ impl Converter<'_> {
         if let Some(heights) = self.placed(material, "displacement", TextureKind::Float, map)
             && heights.constant().is_none()
         {
+            let (heights, was_nearest) = heights.smooth();
+            if was_nearest {
+                let message = "the picture of heights is linear between its pixels: squares have no slope";
+                self.notes.changed(material.place_of("displacement"), message);
+            }
             surface = Element::plugin("bsdf", "bumpmap")
                 .holding(heights.element("heights", Use::Number, self.files))
                 .holding(surface);

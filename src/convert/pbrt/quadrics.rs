@@ -11,8 +11,8 @@ use crate::convert::notes::Notes;
 use crate::convert::xml::Element;
 
 /// Steps of a mesh around the axis and along it.
-const AROUND: u32 = 256;
-const ALONG: u32 = 96;
+const AROUND: u32 = 128;
+const ALONG: u32 = 64;
 
 /// What a quadric becomes.
 pub enum Quadric {
@@ -74,8 +74,8 @@ fn sphere(shape: &Shape, radius: f64, turn: f64) -> Quadric {
     let is_whole = turn == 360.0 && z_min <= -radius && z_max >= radius;
     if let (true, Some(scale)) = (is_whole, even_scale(shape.to_world)) {
         let (to_world, u) = without_mirror(shape.to_world);
-        let element =
-            Element::plugin("shape", "sphere").transform("to_world", to_world * DAffine3::from_scale(DVec3::splat(radius)));
+        let element = Element::plugin("shape", "sphere")
+            .transform("to_world", to_world * DAffine3::from_scale(DVec3::splat(radius)));
         // pbrt's v runs from −z to +z, Mitsuba's from +z to −z
         let v = DAffine2 { matrix2: DMat2::from_diagonal(DVec2::new(1.0, -1.0)), translation: DVec2::Y };
         let world_radius = radius * scale;
