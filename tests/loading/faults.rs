@@ -112,14 +112,20 @@ fn other_versions_are_faults() {
 #[test]
 fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
     assert_each(&[
-        ("  <bsdf type='glas'/>", "2:15: unknown bsdf \"glas\"; known: conductor, dielectric, diffuse,"),
+        (
+            "  <bsdf type='glas'/>",
+            "2:15: unknown bsdf \"glas\"; known: blendbsdf, bumpmap, conductor, dielectric, diffuse,",
+        ),
         ("<bsdf type='difuse'/>", "2:13: unknown bsdf \"difuse\" (did you mean \"diffuse\"?); known: "),
         (
             "<shape type='sphere '/>",
             "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, disk, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
-        ("<emitter type='sun'/>", "2:16: unknown emitter \"sun\"; known: area, constant, directional, point, spot"),
+        (
+            "<emitter type='sun'/>",
+            "2:16: unknown emitter \"sun\"; known: area, constant, directional, envmap, point, spot",
+        ),
         (
             "<shape type='cube'><emitter type='aera'/></shape>",
             "2:35: unknown emitter \"aera\" (did you mean \"area\"?)",
@@ -239,7 +245,14 @@ fn two_sided_surfaces_need_one_or_two_sides_that_do_not_transmit() {
             "<bsdf type='dielectric' id='glass'/><bsdf type='twosided'>\n<ref id='glass'/></bsdf>",
             "3:1: bsdf \"twosided\" cannot hold bsdf \"dielectric\", which transmits light",
         ),
-        ("<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>", "3:1: bsdf \"twosided\" cannot hold another one"),
+        (
+            "<bsdf type='twosided' id='a'>\n<ref id='a'/></bsdf>",
+            "3:1: bsdf \"twosided\" refers to itself, if by detours",
+        ),
+        (
+            "<bsdf type='twosided'>\n<bsdf type='twosided'><bsdf type='diffuse'/></bsdf></bsdf>",
+            "3:1: bsdf \"twosided\" cannot hold another one",
+        ),
         (
             "<shape type='cube'><bsdf type='diffuse'/><bsdf type='diffuse'/></shape>",
             "2:42: the shape has more than one <bsdf>",

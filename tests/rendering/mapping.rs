@@ -121,7 +121,19 @@ fn every_lane_of_a_batch_is_what_the_scalar_mapping_says() {
 
 #[test]
 fn batch_and_scalar_agree_where_a_scene_has_everything() {
-    for name in ["everything", "roulette", "roulette-late", "smooth", "smooth-emitter-light", "sphere-light"] {
+    for name in [
+        "everything",
+        "mixtures",
+        "picture-lights",
+        "relief",
+        "roulette",
+        "roulette-late",
+        "sky",
+        "smooth",
+        "smooth-emitter-light",
+        "sphere-light",
+        "textures",
+    ] {
         let scene = load(&repository("tests/mitsuba").join(name).with_extension("xml"), &[]);
         every_width::<FullProfile>(name, &scene, Kernel::Full);
     }

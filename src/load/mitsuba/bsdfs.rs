@@ -107,7 +107,7 @@ impl<'a> Library<'a> {
         if let Some(sides) = self.listed.get(&std::ptr::from_ref(element)) {
             return Some(*sides);
         }
-        let sides = match self.bsdf(element)? {
+        let sides = match self.bsdf(element, element)? {
             Bsdf::One(one) => Sides::One(self.list(one)),
             Bsdf::Two { front, back } => {
                 let front = self.list(front);
@@ -142,13 +142,14 @@ impl<'a> Library<'a> {
         self.ids.referred(element, "bsdf", self.faults)
     }
 
-    /// Reads an element, unless it has been read; its appearances are listed only when a shape uses them.
-    pub fn bsdf(&mut self, element: &'a Element) -> Option<Bsdf> {
+    /// Reads an element, unless it has been read; its appearances are listed only when a shape uses them. `user` is the
+    /// element itself or what refers to it.
+    pub fn bsdf(&mut self, element: &'a Element, user: &Element) -> Option<Bsdf> {
         let key = std::ptr::from_ref(element);
         match self.read.get(&key) {
             Some(Reading::Done(bsdf)) => return bsdf.clone(),
             Some(Reading::Begun) => {
-                self.faults.at(&element.span, format!("{} is made of itself, by references", element.described()));
+                self.faults.at(&user.span, format!("{} refers to itself, if by detours", element.described()));
                 return None;
             }
             None => {}
@@ -201,7 +202,7 @@ impl<'a> Library<'a> {
         let is_enough = nested.len() >= *accepted.start();
         let read: Vec<_> = nested
             .into_iter()
-            .map(|child| Some((child, self.resolved(child).and_then(|resolved| self.bsdf(resolved))?)))
+            .map(|child| Some((child, self.resolved(child).and_then(|resolved| self.bsdf(resolved, child))?)))
             .collect();
         let read: Option<Vec<_>> = read.into_iter().collect();
         read.filter(|_| is_enough)

@@ -60,7 +60,7 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     let shape_elements = p.nested(&["shape"]);
     let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, &textures, faults);
     for element in p.nested(&["bsdf"]) {
-        bsdfs.bsdf(element); // those that no shape uses have faults as well
+        bsdfs.bsdf(element, element); // those that no shape uses have faults as well
     }
     for element in p.nested(&["texture"]) {
         textures.get(element);

@@ -64,9 +64,10 @@ impl fmt::Debug for Map {
 impl Envmap {
     pub(super) fn read(p: &mut dyn Parameters) -> Option<Envmap> {
         let image = p.image("filename");
-        let scale = p.float("scale").unwrap_or(1.0);
+        let mut scale = p.float("scale").unwrap_or(1.0);
         if !(scale >= 0.0 && scale.is_finite()) {
             p.fault("scale", format!("scale is {scale}; it must be finite and not negative"));
+            scale = 1.0;
         }
         p.boolean("mis_compensation"); // changes how Mitsuba samples, not what is there
         let Some((axes, _)) = similarity(&p.to_world()) else {
