@@ -41,6 +41,7 @@ Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
   2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
+       relt convert: also with --strict where something would be left out
   3    relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
   130  ended at once by a second signal, without an image

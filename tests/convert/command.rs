@@ -53,7 +53,7 @@ fn faults_are_shown_in_place_and_nothing_is_written() {
     )
     .unwrap();
     let output = relt(&folder.path(""), &["a.pbrt", "new.xml"]);
-    assert_output(&output, 2, &["a.pbrt:3:16: Shape: radius: these are no values of type float", "Shape \"shpere\""]);
+    assert_output(&output, 2, &["a.pbrt:3:17: Shape: radius: these are no values of type float", "Shape \"shpere\""]);
     assert!(!folder.path("new.xml").exists());
 }
 

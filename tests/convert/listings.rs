@@ -33,10 +33,10 @@ fn all_that_an_old_mitsuba_scene_loses_is_listed() {
             "everything.xml:20:7: left out: gamma of film \"ldrfilm\"",
             "everything.xml:23:20: changed: sampler \"ldsampler\" becomes \"independent\"",
             "everything.xml:52:17: changed: phong becomes a blend of diffuse and of roughconductor",
-            "everything.xml:59:17: changed: reflectances of sum 1.158 are scaled to 0.99",
+            "everything.xml:59:17: changed: reflectances of sum 1.156 are scaled to 0.99",
             "everything.xml:59:17: changed: ward (ward-duer) becomes a blend",
             "everything.xml:67:78: changed: distribution \"phong\" becomes \"beckmann\"",
-            "everything.xml:94:17: changed: the picture of heights is linear between its pixels",
+            "everything.xml:95:17: changed: the picture of heights is linear between its pixels",
             "everything.xml:100:108: left out: alpha of bsdf \"roughdiffuse\"",
             "everything.xml:107:17: left out: the coat of bsdf \"coating\"",
             "everything.xml:114:16: left out: shape \"heightfield\"",
@@ -165,7 +165,7 @@ fn faulty_pbrt_scenes_say_where_and_why() {
     }
     for (world, expected) in [
         ("Shpae \"sphere\"", "2:1: unknown directive \"Shpae\" (did you mean \"Shape\"?)"),
-        ("Shape \"sphere\" \"float radius\" [ x ]", "2:33: \"x\" is not a number"),
+        ("Shape \"sphere\" \"float radius\" [ x ]", "2:33: Shape: \"x\" is not a number"),
         ("Shape \"sphere\" \"float radius\" [ 1", "2:17: Shape: the parameter has no value, or its bracket no end"),
         ("Shape \"sphere\" \"flaot radius\" 1", "2:17: Shape: unknown type \"flaot\" (did you mean \"float\"?)"),
         ("Shape \"sphere\" \"radius\" 1", "2:17: Shape: \"radius\" is no parameter"),

@@ -67,7 +67,7 @@ fn what_is_named_as_in_mitsuba_2_is_read_as_well() {
 fn colours_become_linear_rgb() {
     let reflectance = |colour: &str| format!("<bsdf type='diffuse'>{colour}</bsdf>");
     let cases = [
-        ("<srgb name='reflectance' value='#ff8000'/>", "1,0.21586053,0"),
+        ("<srgb name='reflectance' value='#ff8000'/>", "1,0.2158605,0"),
         ("<srgb name='reflectance' value='0.5, 0, 1'/>", "0.21404114,0,1"),
         ("<rgb name='reflectance' value='#ff0080'/>", "1,0,0.5019608"),
         ("<xyz name='reflectance' value='0.95047 1 1.08883'/>", "0.99999"),

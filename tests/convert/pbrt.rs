@@ -160,7 +160,7 @@ fn the_angle_of_view_is_that_of_the_shorter_side() {
     for (width, height, options, expected) in [
         (8, 8, "\"float fov\" 90", "fov=90 fov_axis=x"),
         // tan(θ/2) = 2
-        (16, 8, "\"float fov\" 90", "fov=126.8699 fov_axis=x"),
+        (16, 8, "\"float fov\" 90", "fov=126.869896 fov_axis=x"),
         (8, 16, "\"float fov\" 90", "fov=90 fov_axis=x"),
         (
             16,
@@ -241,11 +241,6 @@ fn lights_have_the_brightness_that_pbrt_gives_them() {
             ("LightSource \"infinite\" \"rgb L\" [ 1 2 3 ]", "constant(radiance=1,2,3)"),
             // π of radiance 1
             ("LightSource \"infinite\" \"float illuminance\" 6.2831855", "constant(radiance=2,2,2)"),
-            // what is a spectrum has luminance 1, whatever its values
-            (
-                "LightSource \"infinite\" \"spectrum L\" [ 300 9 900 9 ]",
-                "constant(radiance=1.2049359,0.9482751,0.9086822)",
-            ),
             (
                 "LightSource \"spot\" \"point3 to\" [ 0 0 2 ] \"float coneangle\" 20",
                 "spot(to_world(matrix:1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1) intensity=1,1,1 cutoff_angle=20 beam_width=15)",
@@ -284,16 +279,21 @@ fn a_film_s_gain_goes_into_its_lights() {
 }
 
 #[test]
-fn a_blackbody_has_its_hue_and_no_brightness_of_its_own() {
+fn light_by_its_spectrum_has_the_luminance_of_its_scale() {
     let folder = Folder::new();
-    let text = format!("{BEGIN} LightSource \"infinite\" \"blackbody L\" 3000 \"float scale\" 10");
-    let (_, output) = folder.convert_text("pbrt/case.pbrt", &text).unwrap();
-    let shown = shown(&output, "emitter");
-    let rgb: Vec<f64> =
-        shown.trim_matches(|c: char| !c.is_ascii_digit()).split(',').map(|n| n.parse().unwrap()).collect();
-    let luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-    assert!((luminance - 10.0).abs() < 0.02, "{rgb:?}");
-    assert!(rgb[0] > 2.0 * rgb[1] && rgb[1] > 2.0 * rgb[2], "{rgb:?}");
+    for (light, red_over_green) in [
+        ("\"blackbody L\" 3000", 2.0..2.5),
+        ("\"blackbody L\" 6500", 0.95..1.05),
+        ("\"spectrum L\" [ 300 9 900 9 ]", 1.25..1.3), // equal energy is redder than daylight
+    ] {
+        let text = format!("{BEGIN} LightSource \"infinite\" {light} \"float scale\" 10");
+        let (_, output) = folder.convert_text("pbrt/case.pbrt", &text).unwrap();
+        let shown = shown(&output, "emitter");
+        let rgb = shown.trim_matches(|c: char| !c.is_ascii_digit()).split(',');
+        let [r, g, b]: [f64; 3] = rgb.map(|n| n.parse().unwrap()).collect::<Vec<_>>().try_into().unwrap();
+        assert!((0.2126 * r + 0.7152 * g + 0.0722 * b - 10.0).abs() < 0.02, "{light}: {shown}");
+        assert!(red_over_green.contains(&(r / g)), "{light}: {shown}");
+    }
 }
 
 #[test]
