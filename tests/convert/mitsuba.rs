@@ -70,7 +70,7 @@ fn colours_become_linear_rgb() {
         ("<srgb name='reflectance' value='#ff8000'/>", "1,0.2158605,0"),
         ("<srgb name='reflectance' value='0.5, 0, 1'/>", "0.21404114,0,1"),
         ("<rgb name='reflectance' value='#ff0080'/>", "1,0,0.5019608"),
-        ("<xyz name='reflectance' value='0.95047 1 1.08883'/>", "0.99999"),
+        ("<xyz name='reflectance' value='0.95047 1 1.08883'/>", "1.0000"),
     ];
     let folder = Folder::new();
     for (colour, expected) in cases {
