@@ -112,8 +112,14 @@ fn numbers_of(rgb: [f32; 3]) -> Rgb {
     rgb.map(f64::from)
 }
 
-/// A surface that scatters what it meets evenly on its other side; `base_color` is how much of it. Mitsuba 3's only
-/// diffuse transmitter is the one inside of `principledthin`.
+/// A sheet that scatters what it meets evenly on its other side; `base_color` is how much of it. Mitsuba 3's only diffuse
+/// transmitter is the one inside of `principledthin`.
 fn diffuse_transmitter(base_color: Element) -> Element {
-    Element::plugin("bsdf", "principledthin").holding(base_color).float("diff_trans", 2.0).float("roughness", 1.0)
+    Element::plugin("bsdf", "principledthin").holding(base_color).float("diff_trans", 2.0)
+}
+
+/// A sheet that scatters what it meets on the side that it comes from, whichever that is. Beside something that transmits,
+/// a `twosided` cannot do that; this one differs from a diffuse one at grazing angles.
+fn diffuse_sheet(base_color: Element) -> Element {
+    Element::plugin("bsdf", "principledthin").holding(base_color).float("diff_trans", 0.0).float("roughness", 0.5)
 }

@@ -61,6 +61,7 @@ fn all_that_a_pbrt_scene_loses_is_listed() {
             "everything.pbrt:11:41: left out: regularize of Integrator \"bdpt\"",
             "everything.pbrt:21:30: left out: texture \"marble\"",
             "everything.pbrt:26:20: changed: a rough coat on a diffuse base becomes roughplastic",
+            "everything.pbrt:59:13: changed: what a diffusetransmission reflects differs",
             "everything.pbrt:61:10: changed: a sphere that is partial, stretched or textured in its own way becomes a mesh",
             "everything.pbrt:64:26: changed: eta: one refractive index for all colours",
             "everything.pbrt:67:10: changed: a sphere that is partial, stretched or textured in its own way becomes a mesh",

@@ -72,6 +72,19 @@ fn materials_that_transmit_have_their_own_back() {
                 "roughdielectric(distribution=ggx alpha_u=0.1 alpha_v=0.2 int_ior=1.7847 ext_ior=1)",
             ),
             (&of("\"thindielectric\" \"float eta\" 1.3"), "thindielectric(int_ior=1.3 ext_ior=1)"),
+            (
+                // shares of 0.3 and 0.6 in a sum of 0.9
+                &of(
+                    "\"diffusetransmission\" \"rgb reflectance\" [ 0.3 0.2 0.1 ] \"rgb transmittance\" [ 0.2 0.6 0.4 ]",
+                ),
+                "blendbsdf(weight=0.6666667 principledthin(base_color=0.9,0.6,0.3 diff_trans=0 roughness=0.5) \
+                 principledthin(base_color=0.3,0.9,0.6 diff_trans=2))",
+            ),
+            (
+                "MakeNamedMaterial \"d\" \"string type\" \"diffuse\" MakeNamedMaterial \"n\" \"string type\" \"interface\" \
+                 Material \"mix\" \"string materials\" [ \"n\" \"d\" ] \"float amount\" 0.75 Shape \"sphere\"",
+                "blendbsdf(weight=0.75 null principledthin(base_color=0.5,0.5,0.5 diff_trans=0 roughness=0.5))",
+            ),
             (&of("\"interface\""), "null"),
             (&of("\"\""), "null"),
         ],

@@ -8,10 +8,10 @@ use super::Converter;
 use super::parameters::Parameters;
 use super::spectra::{self, Metal};
 use super::world::{MaterialReference, TextureKind};
-use crate::convert::diffuse_transmitter;
 use crate::convert::sums::{Shares, shares};
 use crate::convert::textures::{Picture, Pixels, Texture, Use, Wrap};
 use crate::convert::xml::Element;
+use crate::convert::{diffuse_sheet, diffuse_transmitter};
 use crate::load::faults::{did_you_mean, list};
 
 /// A surface, and whether light goes through it.
@@ -295,11 +295,11 @@ fn diffusetransmission(c: &Converter, p: &Parameters, map: DAffine2, _: usize) -
         let message = format!("reflectance and transmittance of sum {:.3} are scaled to 0.99", shares.sum);
         c.notes.changed(&p.place, message);
     }
-    let front = two_sided(Element::plugin("bsdf", "diffuse").holding(shares.first.element(
-        "reflectance",
-        Use::Colour,
-        c.files,
-    )));
+    if shares.weight < 1.0 {
+        let message = "what a diffusetransmission reflects differs from an even scattering at grazing angles";
+        c.notes.changed(&p.place, message);
+    }
+    let front = diffuse_sheet(shares.first.element("base_color", Use::Colour, c.files));
     let through = diffuse_transmitter(shares.second.element("base_color", Use::Colour, c.files));
     transmitting(match shares.weight {
         0.0 => front,
@@ -325,15 +325,42 @@ fn mix(c: &Converter, p: &Parameters, map: DAffine2, depth: usize) -> Surface {
         return reflecting(Element::plugin("bsdf", "diffuse"));
     }
     let place = p.place_of("materials");
-    let parts =
-        [first, second].map(|name| c.surface(&MaterialReference::Named(name.clone(), place.clone()), map, depth + 1));
+    let references = [first, second].map(|name| MaterialReference::Named(name.clone(), place.clone()));
+    let parts = references.each_ref().map(|reference| c.surface(reference, map, depth + 1));
     let transmits = parts.iter().any(|part| part.transmits);
     let blend = Element::plugin("bsdf", "blendbsdf").holding(amount.element("weight", Use::Number, c.files));
-    let element = parts.into_iter().fold(blend, |blend, part| {
-        // in a mixture with glass, what reflects must do so on both sides by itself
-        blend.holding(if transmits && !part.transmits { two_sided(part.element) } else { part.element })
+    let element = parts.into_iter().zip(&references).fold(blend, |blend, (part, reference)| {
+        blend.holding(if transmits && !part.transmits {
+            beside_glass(c, p, part, reference, map)
+        } else {
+            part.element
+        })
     });
     Surface { element, transmits }
+}
+
+/// A surface that only reflects, in a mixture with one that transmits: it cannot be `twosided` there.
+fn beside_glass(
+    c: &Converter,
+    mixture: &Parameters,
+    surface: Surface,
+    reference: &MaterialReference,
+    map: DAffine2,
+) -> Element {
+    match c.definition(reference).filter(|material| material.kind == "diffuse") {
+        Some(material) => {
+            let message =
+                "what is diffuse beside something that transmits differs from an even scattering at grazing angles";
+            c.notes.changed(&mixture.place, message);
+            let reflectance = c.colour(material, "reflectance", 0.5, map);
+            c.bumps(material, map, diffuse_sheet(reflectance.element("base_color", Use::Colour, c.files)))
+        }
+        None => {
+            let message = "what reflects beside something that transmits does so on its front only";
+            c.notes.left_out(&mixture.place, message);
+            surface.element
+        }
+    }
 }
 
 /// Keeps what is seen of a surface where its opacity is high.

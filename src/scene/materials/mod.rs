@@ -13,6 +13,7 @@ mod fresnel;
 mod microfacets;
 mod null;
 mod plastic;
+mod principledthin;
 mod roughconductor;
 mod roughdielectric;
 mod thindielectric;
@@ -28,6 +29,7 @@ pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use null::Null;
 pub use plastic::Plastic;
+pub use principledthin::PrincipledThin;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
 pub use thindielectric::ThinDielectric;
@@ -261,6 +263,7 @@ registry! {
     "diffuse" => Diffuse,
     "null" => Null,
     "plastic" => Plastic,
+    "principledthin" => PrincipledThin,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
     "thindielectric" => ThinDielectric,
