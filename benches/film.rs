@@ -48,7 +48,8 @@ fn spread(c: &mut Criterion) {
     let mut group = c.benchmark_group("film/spread");
     group.warm_up_time(WARM_UP).measurement_time(MEASUREMENT).nresamples(RESAMPLES);
     group.throughput(Throughput::Elements(1));
-    for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }] {
+    let lanczos = Filter::Lanczos { lobes: 3 };
+    for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }, lanczos] {
         let footprint = Footprint::new(filter, 256, 256);
         group.bench_function(BenchmarkId::from_parameter(format!("{filter:?}")), |b| {
             let mut x = 0.1;

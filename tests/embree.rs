@@ -1,6 +1,6 @@
 //! Does Embree, behind our wall, do what the renderer relies on?
 
-use glam::{DVec3, Vec3};
+use glam::{Affine3A, DVec3, Mat3A, Vec3};
 use relt::embree::{Device, Geometry, Hit, Hits, MISS, Rays, Scene, Width};
 use relt::scene::Mesh;
 use std::path::Path;
@@ -31,8 +31,8 @@ fn hits_do_not_depend_on_the_width_over_millions_of_rays() {
 
 fn assert_same_hits_for_all_widths(device: &Device, rays: usize) {
     const BATCH: usize = 1 << 16;
-    for name in SCENES.into_iter().chain(["quadrics"]) {
-        let scene = Scene::new(device, geometries(name)).unwrap();
+    for name in SCENES.into_iter().chain(["quadrics", "instances"]) {
+        let scene = Scene::new(device, geometries(device, name)).unwrap();
         for (kind, make) in RAY_KINDS {
             let mut random = Random(1);
             let mut differences: [Differences; 4] = Default::default();
@@ -85,7 +85,9 @@ fn compare_widths(scene: &Scene, rays: &Rays, differences: &mut [Differences; 4]
         found.rays += rays.len();
         for i in 0..rays.len() {
             let same = |a: &[f32], b: &[f32]| a[i].to_bits() == b[i].to_bits();
-            let primitive = hits.geometry[i] == single.geometry[i] && hits.primitive[i] == single.primitive[i];
+            let primitive = hits.geometry[i] == single.geometry[i]
+                && hits.primitive[i] == single.primitive[i]
+                && hits.instance.get(i) == single.instance.get(i);
             let u_v = same(&hits.u, &single.u) && same(&hits.v, &single.v);
             let t = same(&hits.t, &single.t);
             let occlusion = occluded[i] == single_occluded[i];
@@ -201,11 +203,16 @@ fn corners(scene: &Scene, hit: Hit) -> [DVec3; 3] {
 
 #[test]
 fn packets_of_every_fill_give_the_hits_of_single_rays() {
-    let scene = Scene::new(&device(), quadrics()).unwrap();
+    for name in ["quadrics", "instances"] {
+        assert_same_hits_for_every_fill(&Scene::new(&device(), geometries(&device(), name)).unwrap());
+    }
+}
+
+fn assert_same_hits_for_every_fill(scene: &Scene) {
     let mut random = Random(3);
     let (mut hits, mut occluded) = (Hits::default(), Vec::new());
     for n in 0..=40 {
-        let mut rays = random_rays(&scene, &mut random, n);
+        let mut rays = random_rays(scene, &mut random, n);
         for i in 0..n {
             rays.tfar[i] = 2.0 * random.unit(); // some end before anything
         }
@@ -241,6 +248,7 @@ fn a_ray_that_hits_nothing_leaves_nothing_behind_in_its_lane() {
             u: vec![0.0; n],
             v: vec![0.0; n],
             t: vec![7.0; n],
+            instance: Vec::new(),
         };
         assert_eq!(hits, nothing, "width {width}");
     }
@@ -276,8 +284,8 @@ fn a_nan_hits_nothing_and_disturbs_no_other_ray() {
 
 #[test]
 fn occlusion_is_a_closest_hit_before_the_end_of_the_ray() {
-    for name in SCENES.into_iter().chain(["quadrics"]) {
-        let scene = Scene::new(&device(), geometries(name)).unwrap();
+    for name in SCENES.into_iter().chain(["quadrics", "instances"]) {
+        let scene = Scene::new(&device(), geometries(&device(), name)).unwrap();
         let rays = random_rays(&scene, &mut Random(6), 20_000);
         let (mut hits, mut occluded) = (Hits::default(), Vec::new());
         for width in Width::ALL {
@@ -353,7 +361,80 @@ fn disks_are_hit_from_both_sides_within_their_radius() {
 }
 
 #[test]
-fn spheres_and_disks_are_hit_alike_on_all_instruction_sets() {
+fn cylinders_are_hit_from_both_sides_between_their_ends() {
+    let mut random = Random(14);
+    let mut doubtful = 0;
+    for round in 0..200 {
+        let (start, radius) = (10.0 * random.cube() - 5.0, (4.0 * random.unit() - 3.0).exp());
+        let along = if round % 4 == 0 { Vec3::Y } else { random.direction() };
+        let length = (4.0 * random.unit() - 3.0).exp();
+        let scene = Scene::new(&device(), vec![Geometry::Cylinder { start, end: start + length * along, radius }]);
+        let scene = scene.unwrap();
+        for _ in 0..50 {
+            // from anywhere near to a point of the wall, or of its continuation beyond the ends
+            let height = length * (2.0 * random.unit() - 0.5);
+            let across = along.cross(random.direction()).normalize();
+            let target = start + height * along + radius * across;
+            let origin = target + (radius + length) * (0.1 + random.unit()) * random.direction();
+            let direction = (target - origin) * (0.5 + random.unit());
+            let hit = scene.closest_one(origin, direction, f32::INFINITY);
+            let [expected, margin] =
+                cylinder_oracle([start, along, origin, direction].map(Vec3::as_dvec3), length, radius);
+            let agrees = match hit {
+                Some(hit) => (f64::from(hit.t) - expected).abs() < 1e-5 * expected && (hit.u, hit.v) == (0.0, 0.0),
+                None => expected.is_infinite(),
+            };
+            let context =
+                format!("cylinder {start} along {along}, {length} long, radius {radius}; {origin} {direction}");
+            assert!(agrees || margin < 1e-4, "{context}: {hit:?}, expected {expected}");
+            doubtful += usize::from(margin < 1e-4);
+            let shadow = scene.occluded_one(origin, direction, f32::INFINITY);
+            assert_eq!(shadow, hit.is_some(), "{context}");
+        }
+    }
+    assert!(doubtful < 1000, "{doubtful} of 10000 rays went uncompared");
+}
+
+/// The t at which a ray meets a cylinder, or infinity, by a search for changes of sign of the distance to the wall; and how
+/// near it comes to an end or to grazing the wall, relative to the size of the cylinder.
+fn cylinder_oracle([start, axis, origin, direction]: [DVec3; 4], length: f32, radius: f32) -> [f64; 2] {
+    const STEPS: usize = 4000;
+    let (length, radius) = (f64::from(length), f64::from(radius));
+    let axis = axis.normalize();
+    let at = |t: f64| {
+        let p = origin + t * direction - start;
+        let height = p.dot(axis);
+        ((p - height * axis).length() - radius, height)
+    };
+    let step = 6.0 * (length + radius) / direction.length() / STEPS as f64;
+    let mut margin = f64::INFINITY;
+    for i in 0..STEPS {
+        let [mut low, mut high] = [i, i + 1].map(|i| i as f64 * step);
+        let ((before, height), (after, _)) = (at(low), at(high));
+        let off_the_ends = height.abs().min((height - length).abs());
+        if before.abs() < 2.0 * step * direction.length() {
+            // near the wall: a chord may hide within a step, and the end of the wall may be just here
+            let grazing = (at(low + step).0 - before).abs() < 0.1 * step * direction.length();
+            margin = margin.min(if grazing { 0.0 } else { off_the_ends / (length + radius) });
+        }
+        if (before < 0.0) == (after < 0.0) {
+            continue;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (at(middle).0 < 0.0) == (before < 0.0) { low = middle } else { high = middle }
+        }
+        let (_, height) = at(low);
+        margin = margin.min(height.abs().min((height - length).abs()) / (length + radius));
+        if (0.0..=length).contains(&height) {
+            return [low, margin];
+        }
+    }
+    [f64::INFINITY, margin]
+}
+
+#[test]
+fn spheres_disks_and_cylinders_are_hit_alike_on_all_instruction_sets() {
     let shapes: Vec<_> = quadrics().into_iter().filter(|shape| !matches!(shape, Geometry::Triangles(_))).collect();
     let reference = Scene::new(&device(), shapes.clone()).unwrap();
     let rays = random_rays(&reference, &mut Random(10), 100_000);
@@ -383,6 +464,74 @@ fn shapes_keep_their_place_and_the_box_holds_them_all() {
     let (lower, upper) = scene.bounds().unwrap();
     assert!(lower.abs_diff_eq(Vec3::new(-0.25, -1.0, -1.0), 1e-4), "{lower}");
     assert!(upper.abs_diff_eq(Vec3::new(3.25, 2.0, 2.0), 1e-4), "{upper}");
+}
+
+#[test]
+fn an_instance_is_hit_where_the_transformed_shapes_are() {
+    let device = device();
+    let mut random = Random(15);
+    let group = Arc::new(Scene::new(&device, meshes("lattice")).unwrap());
+    for _ in 0..8 {
+        let to_world = random_transform(&mut random);
+        let instance = Geometry::Instance { of: group.clone(), to_world };
+        let placed = Scene::new(&device, vec![Geometry::Sphere { center: Vec3::splat(1e6), radius: 1.0 }, instance]);
+        let flat = Scene::new(&device, meshes("lattice").iter().map(|g| transformed(g, to_world)).collect()).unwrap();
+        let (placed, mut hits, mut expected) = (placed.unwrap(), Hits::default(), Hits::default());
+        let rays = random_rays(&flat, &mut random, 20_000);
+        placed.closest(Width::W8, &rays, &mut hits);
+        flat.closest(Width::W8, &rays, &mut expected);
+        let mut differ = 0;
+        for i in 0..rays.len() {
+            match (hits.get(i), expected.get(i)) {
+                (Some(hit), Some(expected))
+                    if (hit.geometry, hit.primitive) == (expected.geometry, expected.primitive) =>
+                {
+                    assert_eq!((hit.instance, expected.instance), (1, MISS));
+                    let near = (hit.t - expected.t).abs() <= 1e-3 * expected.t.max(0.01);
+                    let same_place = (hit.u - expected.u).abs().max((hit.v - expected.v).abs()) < 1e-2;
+                    assert!(near && same_place, "ray {i}: {hit:?}, expected {expected:?}");
+                }
+                (None, None) => {}
+                _ => differ += 1, // on edges either neighbour may be hit
+            }
+        }
+        assert!(differ < 40, "{differ} of 20000 rays hit something else, {to_world:?}");
+    }
+}
+
+#[test]
+fn hits_in_groups_name_the_instance_and_the_shape_in_the_group() {
+    let device = device();
+    let sphere = |x: f32| Geometry::Sphere { center: Vec3::new(x, 0.0, 0.0), radius: 0.25 };
+    let group = Arc::new(Scene::new(&device, vec![sphere(0.0), sphere(1.0)]).unwrap());
+    let at = |x: f32| Geometry::Instance { of: group.clone(), to_world: Affine3A::from_translation(x * Vec3::X) };
+    let scene = Scene::new(&device, vec![at(10.0), sphere(0.0), at(20.0)]).unwrap();
+    drop(group);
+    let mut rays = Rays::default();
+    for x in [-1.0, 0.5, 10.5, 15.0, 20.5, 22.0] {
+        rays.push(Vec3::new(x, 0.0, 0.0), Vec3::X, f32::INFINITY);
+    }
+    for width in Width::ALL {
+        let mut hits = Hits::default();
+        scene.closest(width, &rays, &mut hits);
+        let found: Vec<_> = (0..rays.len()).map(|i| hits.get(i).map(|hit| (hit.instance, hit.geometry))).collect();
+        let expected = [Some((MISS, 1)), Some((0, 0)), Some((0, 1)), Some((2, 0)), Some((2, 1)), None];
+        assert_eq!(found, expected, "width {width}");
+        let one = |i: usize| scene.closest_one(rays.origin(i), rays.direction(i), f32::INFINITY);
+        assert!((0..rays.len()).all(|i| one(i) == hits.get(i)), "width {width}");
+    }
+    let (lower, upper) = scene.bounds().unwrap();
+    assert!(lower.abs_diff_eq(Vec3::splat(-0.25), 1e-4) && upper.abs_diff_eq(Vec3::new(21.25, 0.25, 0.25), 1e-4));
+}
+
+#[test]
+fn a_build_tells_how_far_it_is() {
+    let told = std::sync::Mutex::new(Vec::new());
+    let watch = |part: f64| told.lock().unwrap().push(part);
+    let scene = Scene::watched(&device(), meshes("caustic"), &watch).unwrap();
+    let told = told.into_inner().unwrap();
+    assert!(!told.is_empty() && told.iter().all(|part| (0.0..=1.0).contains(part)), "{told:?}");
+    assert!(scene.closest_one(Vec3::ZERO, Vec3::X, f32::INFINITY).is_some());
 }
 
 #[test]
@@ -498,8 +647,12 @@ fn device() -> Device {
     Device::new("").unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn geometries(name: &str) -> Vec<Geometry> {
-    if name == "quadrics" { quadrics() } else { meshes(name) }
+fn geometries(device: &Device, name: &str) -> Vec<Geometry> {
+    match name {
+        "quadrics" => quadrics(),
+        "instances" => instances(device),
+        _ => meshes(name),
+    }
 }
 
 type MakeRays = fn(&Scene, &mut Random, usize) -> Rays;
@@ -528,7 +681,7 @@ fn bounce_rays(scene: &Scene, random: &mut Random, n: usize) -> Rays {
             continue;
         };
         let point = from.origin(i) + hit.t * from.direction(i);
-        let normal = normal_of(&scene.geometries()[hit.geometry as usize], hit.primitive, point);
+        let normal = normal_of(scene, hit, point);
         let facing = if normal.dot(from.direction(i)) > 0.0 { -normal } else { normal };
         let direction = (facing + random.direction()).normalize_or(facing);
         rays.push(point + 1e-4 * facing, direction, f32::INFINITY);
@@ -543,29 +696,47 @@ fn edge_rays(scene: &Scene, random: &mut Random, n: usize) -> Rays {
     for _ in 0..n {
         let origin = lower + (upper - lower) * random.cube();
         let geometry = &scene.geometries()[random.below(scene.geometries().len())];
-        let target = match geometry {
-            Geometry::Triangles(mesh) => {
-                let [a, b, _] = mesh.corners(random.below(mesh.triangles.len()) as u32);
-                if random.below(4) == 0 { a } else { a + (b - a) * random.unit() }
-            }
-            Geometry::Sphere { center, radius } => center + *radius * random.direction(),
-            Geometry::Disk { center, normal, radius } => {
-                center + *radius * normal.cross(random.direction()).normalize()
-            }
-        };
+        let target = point_on_edge(geometry, random);
         rays.push(origin, (target - origin).normalize(), f32::INFINITY);
     }
     rays
 }
 
-fn normal_of(geometry: &Geometry, primitive: u32, point: Vec3) -> Vec3 {
+/// On an edge, a corner or a rim.
+fn point_on_edge(geometry: &Geometry, random: &mut Random) -> Vec3 {
     match geometry {
         Geometry::Triangles(mesh) => {
-            let [a, b, c] = mesh.corners(primitive);
+            let [a, b, _] = mesh.corners(random.below(mesh.triangles.len()) as u32);
+            if random.below(4) == 0 { a } else { a + (b - a) * random.unit() }
+        }
+        Geometry::Sphere { center, radius } => center + *radius * random.direction(),
+        Geometry::Disk { center, normal, radius } => center + *radius * normal.cross(random.direction()).normalize(),
+        Geometry::Cylinder { start, end, radius } => {
+            let middle = if random.below(2) == 0 { start } else { end };
+            middle + *radius * (end - start).cross(random.direction()).normalize()
+        }
+        Geometry::Instance { of, to_world } => {
+            to_world.transform_point3(point_on_edge(&of.geometries()[random.below(of.geometries().len())], random))
+        }
+    }
+}
+
+fn normal_of(scene: &Scene, hit: Hit, point: Vec3) -> Vec3 {
+    if hit.instance != MISS {
+        let Geometry::Instance { of, to_world } = &scene.geometries()[hit.instance as usize] else { panic!("{hit:?}") };
+        let inverse = to_world.inverse();
+        let normal = normal_of(of, Hit { instance: MISS, ..hit }, inverse.transform_point3(point));
+        return Vec3::from(inverse.matrix3.transpose() * normal).normalize();
+    }
+    match &scene.geometries()[hit.geometry as usize] {
+        Geometry::Triangles(mesh) => {
+            let [a, b, c] = mesh.corners(hit.primitive);
             (b - a).cross(c - a).normalize()
         }
         Geometry::Sphere { center, .. } => (point - center).normalize(),
         Geometry::Disk { normal, .. } => normal.normalize(),
+        Geometry::Cylinder { start, end, .. } => (point - start).reject_from(end - start).normalize(),
+        Geometry::Instance { .. } => panic!("{hit:?} names no instance"),
     }
 }
 
@@ -584,19 +755,52 @@ fn load(file: &Path) -> Mesh {
     Mesh::new(positions, mesh.indices.as_chunks().0.to_vec())
 }
 
-/// Spheres and disks of all sizes, some within others, in a box of triangles.
+/// Spheres, disks and cylinders of all sizes, some within others, in a box of triangles.
 fn quadrics() -> Vec<Geometry> {
     let mut random = Random(7);
     let mut geometries = meshes("cornell-box");
-    for i in 0..40 {
+    for i in 0..60 {
         let (center, radius) = (2.0 * random.cube() - 1.0, 0.02 + 0.3 * random.unit());
-        geometries.push(if i % 2 == 0 {
-            Geometry::Sphere { center, radius }
-        } else {
-            Geometry::Disk { center, normal: random.direction() * (0.1 + random.unit()), radius }
+        let along = random.direction() * (0.1 + random.unit());
+        geometries.push(match i % 3 {
+            0 => Geometry::Sphere { center, radius },
+            1 => Geometry::Disk { center, normal: along, radius },
+            _ => Geometry::Cylinder { start: center, end: center + along, radius },
         });
     }
     geometries
+}
+
+/// Many places of meshes and of quadrics, turned, stretched, sheared and mirrored, in a box of triangles.
+fn instances(device: &Device) -> Vec<Geometry> {
+    let mut random = Random(16);
+    let quadrics = quadrics().into_iter().filter(|shape| !matches!(shape, Geometry::Triangles(_))).collect();
+    let groups = [meshes("lattice"), quadrics].map(|shapes| Arc::new(Scene::new(device, shapes).unwrap()));
+    let mut geometries = meshes("cornell-box");
+    for i in 0..24 {
+        let mut to_world = random_transform(&mut random);
+        to_world.matrix3 *= 0.3;
+        geometries.push(Geometry::Instance { of: groups[i % 2].clone(), to_world });
+    }
+    geometries
+}
+
+/// Anything but singular.
+fn random_transform(random: &mut Random) -> Affine3A {
+    loop {
+        let columns = [0; 3].map(|_| 2.0 * random.cube() - 1.0).map(Into::into);
+        let matrix3 = Mat3A::from_cols(columns[0], columns[1], columns[2]);
+        if matrix3.determinant().abs() > 0.1 {
+            return Affine3A { matrix3, translation: (2.0 * random.cube() - 1.0).into() };
+        }
+    }
+}
+
+/// A mesh elsewhere.
+fn transformed(geometry: &Geometry, to_world: Affine3A) -> Geometry {
+    let Geometry::Triangles(mesh) = geometry else { panic!("only triangles") };
+    let positions = mesh.positions().iter().map(|p| to_world.transform_point3(*p)).collect();
+    Geometry::Triangles(Arc::new(Mesh::new(positions, mesh.triangles.clone())))
 }
 
 /// SplitMix64 (Steele, Lea and Flood, 2014).

@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use relt::film::{Accumulator, Filter, Footprint, Image, Plane, Splat, Splats, Value, exr_file, png_file};
+use relt::film::{
+    Accumulator, Filter, Footprint, Image, PixelFormat, Plane, Splat, Splats, Value, Window, exr_file, png_file,
+};
 
 /// A small generator for test data; `seed` is fixed at every use.
 struct Dice(u64);
@@ -172,7 +174,9 @@ fn a_layer_can_be_cleared_alone() {
     assert_eq!(film.layer(1), [[0.0; 4], [1.0, 2.0, 3.0, 1.0]]);
 }
 
-const FILTERS: [Filter; 7] = [
+const CATMULL_ROM: Filter = Filter::Mitchell { b: 0.0, c: 0.5 };
+
+const FILTERS: [Filter; 11] = [
     Filter::Box,
     Filter::Tent { radius: 1.0 },
     Filter::Tent { radius: 0.3 },
@@ -180,6 +184,10 @@ const FILTERS: [Filter; 7] = [
     Filter::Gaussian { stddev: 0.5 },
     Filter::Gaussian { stddev: 0.45 },
     Filter::Gaussian { stddev: 9.0 },
+    Filter::Mitchell { b: 0.2, c: 0.7 },
+    CATMULL_ROM,
+    Filter::Lanczos { lobes: 3 },
+    Filter::Lanczos { lobes: 16 },
 ];
 
 /// Integrates by the midpoint rule over a regular grid of film positions; filters have bounded second derivatives
@@ -196,7 +204,7 @@ fn a_constant_stays_that_constant_in_every_pixel() {
                 for x in 0..width * per_pixel {
                     let at = |i: u32| ((f64::from(i) + 0.5) / f64::from(per_pixel)) as f32;
                     footprint.spread(at(x), at(y), &mut |pixel, weight| {
-                        assert!(weight >= 0.0, "{filter:?}: weight {weight}");
+                        assert!(weight >= 0.0 || filter.has_negative_lobes(), "{filter:?}: weight {weight}");
                         pixels[pixel as usize] += f64::from(weight) * cell;
                     });
                 }
@@ -219,20 +227,65 @@ fn inside_the_film_weights_are_the_normalised_filter() {
             // ∫ exp(−x²/2σ²) over ±4σ is σ√(2π)·erf(2√2).
             s * (2.0 * PI).sqrt() * 0.999_936_657_516_33 - 8.0 * s * edge
         }
+        Filter::Mitchell { .. } => 1.0,
+        Filter::Lanczos { .. } => panic!("its integral has no closed form"),
     };
-    for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }] {
-        let footprint = Footprint::new(filter, 9, 9);
+    for filter in [Filter::Box, Filter::Tent { radius: 1.0 }, Filter::Gaussian { stddev: 0.5 }, CATMULL_ROM] {
+        let footprint = Footprint::new(filter, 11, 11);
         let mut dice = Dice(9);
         for _ in 0..1000 {
-            let (x, y) = (3.0 + 3.0 * dice.uniform(), 3.0 + 3.0 * dice.uniform());
-            let mut seen = [0f64; 81];
+            let (x, y) = (4.0 + 3.0 * dice.uniform(), 4.0 + 3.0 * dice.uniform());
+            let mut seen = [0f64; 121];
             footprint.spread(x, y, &mut |pixel, weight| seen[pixel as usize] += f64::from(weight));
             for (j, got) in seen.iter().enumerate() {
                 let h = |x: f32, j: usize| filter.evaluate(f64::from(x) - j as f64 - 0.5) / integral(filter);
-                let expected = h(x, j % 9) * h(y, j / 9);
+                let expected = h(x, j % 11) * h(y, j / 11);
                 assert!((got - expected).abs() < 1e-5, "{filter:?} at ({x}, {y}), pixel {j}: {got} ≠ {expected}");
             }
         }
+    }
+}
+
+/// White up to column 6 and black from there on, through the Catmull-Rom spline. A pixel is the integral of h over the
+/// white side: ∫ h from ½ on is 31/384 and from 3/2 on −5/384, of 1 in all. What lies further is white or black.
+#[test]
+fn edges_swing_below_black_and_above_white() {
+    let footprint = Footprint::new(CATMULL_ROM, 12, 1);
+    let mut pixels = [0f64; 12];
+    let (columns, rows) = (6 * 1000, 100);
+    for (x, y) in (0..columns).flat_map(|x| (0..rows).map(move |y| (x, y))) {
+        let [x, y] = [(x, 6.0 / columns as f32), (y, 1.0 / rows as f32)].map(|(i, step)| (i as f32 + 0.5) * step);
+        footprint.spread(x, y, &mut |pixel, weight| {
+            pixels[pixel as usize] += f64::from(weight) * 6.0 / f64::from(columns * rows);
+        });
+    }
+    let expected =
+        [384.0, 384.0, 384.0, 384.0, 389.0, 353.0, 31.0, -5.0, 0.0, 0.0, 0.0, 0.0].map(|share| share / 384.0);
+    for (i, (got, expected)) in pixels.iter().zip(expected).enumerate() {
+        assert!((got - expected).abs() < 1e-4, "pixel {i}: {got}, expected {expected}");
+    }
+}
+
+/// Sums of values of both signs against those in double precision.
+#[test]
+fn weights_below_zero_count_on_the_film() {
+    let footprint = Footprint::new(Filter::Lanczos { lobes: 3 }, 9, 7);
+    let film = Accumulator::new(9, 7, 1, 1.0);
+    let (mut splats, mut dice) = (Splats::new(1), Dice(4));
+    let mut expected = vec![[0f64; 4]; 63];
+    for _ in 0..2000 {
+        let rgb = [dice.heavy(), dice.uniform(), 1.0];
+        footprint.spread(9.0 * dice.uniform(), 7.0 * dice.uniform(), &mut |pixel, weight| {
+            let splat = Splat { pixel, rgb: rgb.map(|value| value * weight), weight };
+            splats.push(0, splat);
+            let values = splat.rgb.into_iter().chain([weight]);
+            expected[pixel as usize].iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(value));
+        });
+    }
+    assert!(splats.layer(0).iter().any(|splat| splat.weight < -1e-3), "some weights are negative");
+    film.deposit(&mut splats);
+    for (got, expected) in film.layer(0).as_flattened().iter().zip(expected.as_flattened()) {
+        assert!((got - expected).abs() < 1e-9 * expected.abs().max(1.0), "{got}, expected {expected}");
     }
 }
 
@@ -274,6 +327,32 @@ fn an_exr_file_reads_back_bit_by_bit() {
     assert_eq!(read.metadata, metadata);
     assert_eq!(read.rgb("uniform"), Some(&test_image(2)));
     assert_eq!(read.rgb("density"), None);
+}
+
+#[test]
+fn a_part_of_a_picture_says_where_it_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.exr");
+    let window = Window { whole: [40, 30], offset: [9, 5] };
+    exr_file::write_part(&path, &test_image(1), PixelFormat::Rgb, window, &[], &[]).unwrap();
+    assert_eq!(exr_file::read_file(&path).unwrap().image, test_image(1));
+    let meta = exr::meta::MetaData::read_from_file(&path, true).unwrap();
+    let header = &meta.headers[0];
+    let (display, data) = (header.shared_attributes.display_window, header.data_window());
+    assert_eq!((display.position.into(), display.size.into()), ((0, 0), (40, 30)));
+    assert_eq!((data.position.into(), data.size.into()), ((9, 5), (13, 7)));
+}
+
+#[test]
+fn an_image_without_colours_is_read_as_gray() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("gray.exr");
+    let gray = test_image(1).without_colour();
+    let layers = [("variance".to_owned(), Plane::Rgb(test_image(2)))];
+    exr_file::write_part(&path, &gray, PixelFormat::Luminance, Window::on_whole(13, 7), &layers, &[]).unwrap();
+    let read = exr_file::read_file(&path).unwrap();
+    assert_eq!(read.image, gray);
+    assert_eq!(read.layers, layers);
 }
 
 #[test]

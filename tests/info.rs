@@ -3,9 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
-/// The report on a scene, lines folded into one.
+/// The report on a scene of `scenes`, or on a scene file of the repository, lines folded into one.
 fn report(scene: &str, options: &[&str]) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene).join("scene.xml");
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = match scene.ends_with(".xml") {
+        true => repository.join(scene),
+        false => repository.join("scenes").join(scene).join("scene.xml"),
+    };
     let output = Command::new(env!("CARGO_BIN_EXE_relt")).arg("info").arg(path).args(options).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -69,4 +73,33 @@ fn the_film_and_embree_are_described() {
         &[],
         &["256 × 256 pixels, box filter", "4.0 MiB for path and mlt, 12.0 MiB for re", "Embree 4.", "ROBUST"],
     );
+}
+
+#[test]
+fn a_lens_takes_two_dimensions_and_no_block_of_its_own() {
+    assert_says(
+        "tests/mitsuba/thin-lens.xml",
+        &[],
+        &[
+            "dimensions film position: 2, place on lens: 2 bounce 1: 4 (direction 2, place on light 2), drawn in one block",
+            "left out: choice of lobe, choice of light",
+        ],
+    );
+}
+
+#[test]
+fn parts_of_pictures_and_filters_are_described() {
+    for (scene, sentence) in [
+        (
+            "tests/mitsuba/crop.xml",
+            "24 × 16 pixels of 30 × 40, from column 5 and row 13 on, Gaussian filter of standard deviation 0.8",
+        ),
+        (
+            "tests/mitsuba/mitchell.xml",
+            "24 × 16 pixels, Mitchell filter with B = 0.2 and C = 0.6 (pixels may be negative)",
+        ),
+        ("tests/mitsuba/lanczos.xml", "Lanczos filter of 3 lobes (pixels may be negative)"),
+    ] {
+        assert_says(scene, &[], &[sentence]);
+    }
 }

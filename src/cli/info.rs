@@ -8,7 +8,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::scene::{Opened, SceneArguments};
 use crate::embree::{Device, Scene as Tracer};
-use crate::film::{Accumulator, Filter};
+use crate::film::{Accumulator, Filter, PixelFormat};
 use crate::path::Layout;
 use crate::scene::description::FilmDescription;
 use crate::scene::{Appearance, Features, Kernel, Scene, materials};
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: Info) -> Result<(), Failure> {
         faults if faults.is_empty() => {}
         faults => return Err(Failure::Input(faults)),
     }
-    let opened = arguments.scene.open()?;
+    let opened = arguments.scene.open(false)?;
     // Whoever reads may have read enough, as `head` does.
     drop(write!(io::stdout(), "{}", report(&opened)));
     Ok(())
@@ -61,13 +61,31 @@ fn film(film: &FilmDescription) -> Vec<String> {
         Filter::Box => "box filter: a sample goes to one pixel".into(),
         Filter::Tent { radius } => format!("tent filter of radius {radius}"),
         Filter::Gaussian { stddev } => format!("Gaussian filter of standard deviation {stddev}"),
+        Filter::Mitchell { b, c } => format!("Mitchell filter with B = {b} and C = {c}"),
+        Filter::Lanczos { lobes } => format!("Lanczos filter of {lobes} lobes"),
+    };
+    let [columns, rows] = film.window.whole;
+    let part = match [film.width, film.height] == film.window.whole {
+        true => String::new(),
+        false => format!(
+            " of {columns} × {rows}, from column {} and row {} on",
+            film.window.offset[0], film.window.offset[1]
+        ),
+    };
+    let format = match film.format {
+        PixelFormat::Rgb => "",
+        PixelFormat::Luminance => ", luminance alone",
+    };
+    let negative = match film.filter.has_negative_lobes() {
+        true => " (pixels may be negative)",
+        false => "",
     };
     let mebibytes = |layers: usize| {
         let bytes = film.width as usize * film.height as usize * Accumulator::BYTES_PER_PIXEL * layers;
         bytes as f64 / f64::from(1 << 20)
     };
     vec![
-        format!("{} × {} pixels, {filter}", film.width, film.height),
+        format!("{} × {} pixels{part}, {filter}{negative}{format}", film.width, film.height),
         format!(
             "memory: {:.1} MiB for path and mlt, {:.1} MiB for re",
             mebibytes(1),
@@ -97,6 +115,8 @@ fn shapes(features: &Features) -> Vec<String> {
         (counts.smooth_meshes, "meshes with shading normals"),
         (counts.spheres, "spheres"),
         (counts.disks, "disks"),
+        (counts.cylinders, "cylinders"),
+        (features.instances, "instances"),
     ])
 }
 
@@ -142,7 +162,9 @@ fn materials(scene: &Scene) -> Vec<String> {
 /// Primary dimensions of the film position and, bounce by bounce, of the decisions there.
 fn dimensions(features: &Features) -> Vec<String> {
     let layout = Layout::new(features);
-    let mut lines = vec!["film position: 2".to_owned()];
+    let of_camera = layout.describe_camera();
+    let mut lines =
+        vec![runs(&of_camera).map(|run| format!("{}: {}", run[0], run.len())).collect::<Vec<_>>().join(", ")];
     // the last vertex of the longest paths decides nothing
     let bounces = layout.max_depth() - 1;
     let first_of_each_kind = [Some(0), layout.roulette_from()].into_iter().flatten().filter(|first| *first < bounces);
@@ -159,8 +181,9 @@ fn dimensions(features: &Features) -> Vec<String> {
         let blocks = if layout.choices(first).is_some() { "two blocks" } else { "one block" };
         lines.push(format!("{range}: {} ({}), drawn in {blocks} of four", names.len(), counted(&names)));
     }
-    let mut unused = vec!["lens"];
+    let mut unused = Vec::new();
     for (needed, what) in [
+        (features.lens, "lens"),
         (features.lobe_choice, "choice of lobe"),
         (features.light_choice(), "choice of light"),
         (layout.roulette_from().is_some(), "roulette"),
@@ -174,16 +197,21 @@ fn dimensions(features: &Features) -> Vec<String> {
 }
 
 /// `direction 2, roulette 1`: names that follow each other, with how often each does.
-fn counted(names: &[&str]) -> String {
-    let runs = names.chunk_by(|a, b| a == b);
-    runs.map(|run| format!("{} {}", run[0], run.len())).collect::<Vec<_>>().join(", ")
+fn counted(names: &[&'static str]) -> String {
+    runs(names).map(|run| format!("{} {}", run[0], run.len())).collect::<Vec<_>>().join(", ")
+}
+
+/// Names that follow each other and are the same.
+fn runs<'a>(names: &'a [&'static str]) -> impl Iterator<Item = &'a [&'static str]> {
+    names.chunk_by(|a, b| a == b)
 }
 
 fn kernel(features: &Features) -> Vec<String> {
     match features.kernel() {
         Kernel::Diffuse => vec![
             "diffuse: diffuse materials on flat meshes, lit by meshes".to_owned(),
-            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, background, points"
+            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, cylinders, instances, \
+             background, points"
                 .to_owned(),
         ],
         Kernel::Plain => vec![
@@ -200,7 +228,7 @@ fn embree(device: &Device, features: &Features) -> Vec<String> {
         device.description(),
         format!("{}; packets native to this processor: {}", Tracer::BUILT_WITH, native.join(", ")),
     ];
-    if features.shapes.spheres + features.shapes.disks == 0 {
+    if features.shapes.quadrics() == 0 {
         lines.push("left out: user geometry".to_owned());
     }
     lines

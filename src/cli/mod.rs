@@ -5,6 +5,7 @@ mod convert;
 mod failure;
 mod info;
 mod ladder;
+mod loading;
 mod reference;
 mod render;
 mod scene;

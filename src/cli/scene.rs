@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::failure::Failure;
+use super::loading::{self, Building};
 use super::values;
 use crate::embree::Device;
-use crate::load;
-use crate::scene::{Scene, SceneDescription};
+use crate::load::{self, Watch};
+use crate::scene::{Features, Scene, SceneDescription};
 
 /// A scene file and values for its parameters.
 #[derive(Args)]
@@ -40,23 +41,27 @@ impl SceneArguments {
             .collect()
     }
 
-    /// Reads the file and builds the scene.
-    pub fn open(&self) -> Result<Opened, Failure> {
-        Opened::of(self.describe()?)
+    /// Reads the file and builds the scene; shows how far that is, unless `quiet`.
+    pub fn open(&self, quiet: bool) -> Result<Opened, Failure> {
+        Opened::of(self.describe(quiet)?, quiet)
     }
 
-    /// Reads the file.
-    pub fn describe(&self) -> Result<SceneDescription, Failure> {
-        load::scene(&self.path, &self.defines).map_err(Failure::shown)
+    /// Reads the file; shows how far that is, unless `quiet`.
+    pub fn describe(&self, quiet: bool) -> Result<SceneDescription, Failure> {
+        let watch = Watch::default();
+        loading::shown(!quiet, &watch, || load::watched(&self.path, &self.defines, &watch)).map_err(Failure::shown)
     }
 }
 
 impl Opened {
-    /// Builds a scene.
-    pub fn of(description: SceneDescription) -> Result<Opened, Failure> {
+    /// Builds a scene; shows how far that is, unless `quiet`.
+    pub fn of(description: SceneDescription, quiet: bool) -> Result<Opened, Failure> {
         let device = Device::new("").map_err(Failure::input)?;
         let warnings = description.warnings.clone();
-        let scene = Scene::new(&device, description).map_err(Failure::running)?;
+        let building = Building::new(Features::of(&description).triangles);
+        let scene =
+            loading::shown(!quiet, &building, || Scene::watched(&device, description, &|part| building.tell(part)));
+        let scene = scene.map_err(Failure::running)?;
         Ok(Opened { device, scene, warnings })
     }
 }

@@ -19,12 +19,15 @@ pub const PROPERTY_NATIVE_RAY16: c_int = 34;
 
 pub const GEOMETRY_TRIANGLE: c_int = 0;
 pub const GEOMETRY_USER: c_int = 120;
+pub const GEOMETRY_INSTANCE: c_int = 121;
 
 pub const BUFFER_INDEX: c_int = 0;
 pub const BUFFER_VERTEX: c_int = 1;
 
 pub const FORMAT_UINT3: c_int = 0x5003;
 pub const FORMAT_FLOAT3: c_int = 0x9003;
+/// Four columns of three: the images of x, y and z, and of the origin.
+pub const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_int = 0x9234;
 
 pub const SCENE_ROBUST: c_int = 1 << 2;
 pub const BUILD_QUALITY_HIGH: c_int = 2;
@@ -138,19 +141,28 @@ pub struct BoundsArguments {
     pub bounds: *mut Bounds,
 }
 
+/// The beginning of `RTCRayQueryContext`, as far as we read it.
+#[repr(C)]
+pub struct QueryContext {
+    /// The instance that is being looked into, [`INVALID_ID`] in the world.
+    pub instance: u32,
+}
+
 /// `RTCIntersectFunctionNArguments` and `RTCOccludedFunctionNArguments`, which differ in name only.
 #[repr(C)]
 pub struct CallbackArguments {
     pub valid: *const i32,
     pub user: *const c_void,
     pub primitive: c_uint,
-    pub context: *mut c_void,
+    pub context: *const QueryContext,
     /// `RTCRayHitN` or `RTCRayN`: fields of `lanes` words each, in the order of [`RayHit`].
     pub rays: *mut f32,
     pub lanes: c_uint,
     pub geometry: c_uint,
 }
 
+/// `RTCProgressMonitorFunction`: gets its own pointer and the fraction that is done; false would end the build.
+pub type ProgressFunction = unsafe extern "C" fn(*mut c_void, f64) -> bool;
 type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
 type Callback = unsafe extern "C" fn(*const CallbackArguments);
 
@@ -217,6 +229,8 @@ functions! {
         release_scene = "rtcReleaseScene": unsafe extern "C" fn(SceneHandle),
         set_scene_flags = "rtcSetSceneFlags": unsafe extern "C" fn(SceneHandle, c_int),
         set_scene_build_quality = "rtcSetSceneBuildQuality": unsafe extern "C" fn(SceneHandle, c_int),
+        set_progress_monitor = "rtcSetSceneProgressMonitorFunction": unsafe extern "C" fn(
+            SceneHandle, Option<ProgressFunction>, *mut c_void),
         commit_scene = "rtcCommitScene": unsafe extern "C" fn(SceneHandle),
         scene_bounds = "rtcGetSceneBounds": unsafe extern "C" fn(SceneHandle, *mut Bounds),
         new_geometry = "rtcNewGeometry": unsafe extern "C" fn(DeviceHandle, c_int) -> GeometryHandle,
@@ -229,6 +243,8 @@ functions! {
             GeometryHandle, BoundsFunction, *const c_void),
         set_intersect_function = "rtcSetGeometryIntersectFunction": unsafe extern "C" fn(GeometryHandle, Callback),
         set_occluded_function = "rtcSetGeometryOccludedFunction": unsafe extern "C" fn(GeometryHandle, Callback),
+        set_instanced_scene = "rtcSetGeometryInstancedScene": unsafe extern "C" fn(GeometryHandle, SceneHandle),
+        set_transform = "rtcSetGeometryTransform": unsafe extern "C" fn(GeometryHandle, c_uint, c_int, *const c_void),
         commit_geometry = "rtcCommitGeometry": unsafe extern "C" fn(GeometryHandle),
         attach_geometry_by_id = "rtcAttachGeometryByID": unsafe extern "C" fn(SceneHandle, GeometryHandle, c_uint),
         intersect1 = "rtcIntersect1": Intersect1,

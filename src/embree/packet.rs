@@ -158,16 +158,18 @@ impl Rays {
 /// Where `geometry` is [`MISS`], the primitive is [`MISS`] too, u and v are 0 and t is the ray's end.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hits {
-    /// Place of the shape in the scene's list, or [`MISS`].
+    /// Place of the shape in the scene's list, or in that of the instance's scene, or [`MISS`].
     pub geometry: Vec<u32>,
-    /// Triangle within the mesh; 0 for spheres and disks.
+    /// Triangle within the mesh; 0 for spheres, disks and cylinders.
     pub primitive: Vec<u32>,
-    /// First barycentric coordinate, the weight of the triangle's second corner; 0 for spheres and disks.
+    /// First barycentric coordinate, the weight of the triangle's second corner; 0 where there is no triangle.
     pub u: Vec<f32>,
-    /// Second barycentric coordinate, the weight of the triangle's third corner; 0 for spheres and disks.
+    /// Second barycentric coordinate, the weight of the triangle's third corner; 0 where there is no triangle.
     pub v: Vec<f32>,
     /// Distance in units of the direction's length.
     pub t: Vec<f32>,
+    /// Place in the scene's list of the instance that was hit, or [`MISS`]; empty where a scene has no instances.
+    pub instance: Vec<u32>,
 }
 
 /// One hit; see [`Hits`] for the fields.
@@ -179,6 +181,7 @@ pub struct Hit {
     pub u: f32,
     pub v: f32,
     pub t: f32,
+    pub instance: u32,
 }
 
 impl Hits {
@@ -191,37 +194,50 @@ impl Hits {
             u: self.u[i],
             v: self.v[i],
             t: self.t[i],
+            instance: self.instance.get(i).copied().unwrap_or(MISS),
         })
     }
 
-    fn resize(&mut self, n: usize) {
+    fn resize(&mut self, n: usize, with_instances: bool) {
         self.geometry.resize(n, MISS);
         self.primitive.resize(n, MISS);
         self.u.resize(n, 0.0);
         self.v.resize(n, 0.0);
         self.t.resize(n, 0.0);
+        self.instance.resize(if with_instances { n } else { 0 }, MISS);
     }
 }
 
 impl Scene {
     /// The closest hits of all rays.
     pub fn closest(&self, width: Width, rays: &Rays, hits: &mut Hits) {
+        if self.has_instances() {
+            self.closest_of::<true>(width, rays, hits);
+        } else {
+            self.closest_of::<false>(width, rays, hits);
+        }
+    }
+
+    /// The closest hits, with their instances or without.
+    fn closest_of<const INSTANCES: bool>(&self, width: Width, rays: &Rays, hits: &mut Hits) {
         let (f, scene) = (&self.device().embree().tracing, self.handle());
         let args = &mut Arguments::new();
         // SAFETY, for all four: the scene is committed and alive; packet, mask and arguments have Embree's layout
         // and alignment (asserted in `ffi`) and live for the call.
         match width {
             // SAFETY: above.
-            Width::W1 => closest::<Align16, 1>(rays, hits, |_, packet| unsafe { (f.intersect1)(scene, packet, args) }),
-            Width::W4 => closest::<Align16, 4>(rays, hits, |valid, packet| {
+            Width::W1 => {
+                closest::<Align16, 1, INSTANCES>(rays, hits, |_, packet| unsafe { (f.intersect1)(scene, packet, args) })
+            }
+            Width::W4 => closest::<Align16, 4, INSTANCES>(rays, hits, |valid, packet| {
                 // SAFETY: above.
                 unsafe { (f.intersect4)(valid.lanes.as_ptr(), scene, packet, args) }
             }),
-            Width::W8 => closest::<Align32, 8>(rays, hits, |valid, packet| {
+            Width::W8 => closest::<Align32, 8, INSTANCES>(rays, hits, |valid, packet| {
                 // SAFETY: above.
                 unsafe { (f.intersect8)(valid.lanes.as_ptr(), scene, packet, args) }
             }),
-            Width::W16 => closest::<Align64, 16>(rays, hits, |valid, packet| {
+            Width::W16 => closest::<Align64, 16, INSTANCES>(rays, hits, |valid, packet| {
                 // SAFETY: above.
                 unsafe { (f.intersect16)(valid.lanes.as_ptr(), scene, packet, args) }
             }),
@@ -258,8 +274,8 @@ impl Scene {
         // SAFETY: as for `closest`.
         unsafe { (self.device().embree().tracing.intersect1)(self.handle(), &mut packet, &mut Arguments::new()) };
         let (hit, [t]) = (packet.hit, packet.ray.tfar);
-        let ([geometry], [primitive], [u], [v]) = (hit.geometry, hit.primitive, hit.u, hit.v);
-        (geometry != MISS).then_some(Hit { geometry, primitive, u, v, t })
+        let ([geometry], [primitive], [u], [v], [instance]) = (hit.geometry, hit.primitive, hit.u, hit.v, hit.instance);
+        (geometry != MISS).then_some(Hit { geometry, primitive, u, v, t, instance })
     }
 
     /// Whether anything lies between the origin of one ray and its end.
@@ -273,12 +289,12 @@ impl Scene {
 }
 
 #[inline]
-fn closest<A: Copy, const N: usize>(
+fn closest<A: Copy, const N: usize, const INSTANCES: bool>(
     rays: &Rays,
     hits: &mut Hits,
     mut trace: impl FnMut(&Valid<A, N>, &mut RayHit<A, N>),
 ) {
-    hits.resize(rays.len());
+    hits.resize(rays.len(), INSTANCES);
     let (packets, rest) = rays.packets::<N>();
     let count = packets[0].len();
     let (geometry, geometry_rest) = hits.geometry.as_chunks_mut::<N>();
@@ -286,28 +302,35 @@ fn closest<A: Copy, const N: usize>(
     let (u, u_rest) = hits.u.as_chunks_mut::<N>();
     let (v, v_rest) = hits.v.as_chunks_mut::<N>();
     let (t, t_rest) = hits.t.as_chunks_mut::<N>();
+    let (instance, instance_rest) = hits.instance.as_chunks_mut::<N>();
 
     let mut packet = RayHit::<A, N>::new();
     for i in 0..count {
         packet.ray.load(packets.map(|array| array[i]));
-        packet.forget_hits();
+        packet.forget_hits::<INSTANCES>();
         trace(&Valid::first(N), &mut packet);
         geometry[i] = packet.hit.geometry;
         primitive[i] = packet.hit.primitive;
         u[i] = packet.hit.u;
         v[i] = packet.hit.v;
         t[i] = packet.ray.tfar;
+        if INSTANCES {
+            instance[i] = packet.hit.instance;
+        }
     }
     let left = rest[0].len();
     if left > 0 {
         packet.ray.load_partial(rest);
-        packet.forget_hits();
+        packet.forget_hits::<INSTANCES>();
         trace(&Valid::first(left), &mut packet);
         geometry_rest.copy_from_slice(&packet.hit.geometry[..left]);
         primitive_rest.copy_from_slice(&packet.hit.primitive[..left]);
         u_rest.copy_from_slice(&packet.hit.u[..left]);
         v_rest.copy_from_slice(&packet.hit.v[..left]);
         t_rest.copy_from_slice(&packet.ray.tfar[..left]);
+        if INSTANCES {
+            instance_rest.copy_from_slice(&packet.hit.instance[..left]);
+        }
     }
 }
 
@@ -394,10 +417,13 @@ impl<A: Copy, const N: usize> RayHit<A, N> {
 
     /// Embree writes only the lanes that hit something.
     #[inline(always)]
-    fn forget_hits(&mut self) {
+    fn forget_hits<const INSTANCES: bool>(&mut self) {
         self.hit.geometry = [MISS; N];
         self.hit.primitive = [MISS; N];
         self.hit.u = [0.0; N];
         self.hit.v = [0.0; N];
+        if INSTANCES {
+            self.hit.instance = [MISS; N];
+        }
     }
 }

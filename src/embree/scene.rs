@@ -5,7 +5,9 @@ use super::ffi::{self, Bounds, GeometryHandle, SceneHandle};
 use super::library::EmbreeError;
 use super::quadric::{self, Quadric};
 use crate::scene::Mesh;
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
+use std::ffi::c_void;
+use std::fmt;
 use std::mem::size_of;
 use std::ptr;
 use std::sync::Arc;
@@ -31,6 +33,22 @@ pub enum Geometry {
         /// Radius, > 0.
         radius: f32,
     },
+    /// A cylinder without caps, hit from outside and from inside.
+    Cylinder {
+        /// Where the axis begins.
+        start: Vec3,
+        /// Where it ends, elsewhere.
+        end: Vec3,
+        /// Radius, > 0.
+        radius: f32,
+    },
+    /// All that a scene holds, placed elsewhere; the scene itself holds no instances.
+    Instance {
+        /// The scene.
+        of: Arc<Scene>,
+        /// Its coordinates to those of this scene, not singular.
+        to_world: Affine3A,
+    },
 }
 
 /// A built hierarchy, ready for rays from any number of threads.
@@ -40,11 +58,13 @@ pub struct Scene {
     geometries: Vec<Geometry>,
     /// What Embree reads: in place, and alive as long as the scene.
     shapes: Box<[Shape]>,
+    has_instances: bool,
 }
 
 enum Shape {
     Triangles(Arc<Mesh>),
     Quadric(Quadric),
+    Instance(Arc<Scene>, Affine3A),
 }
 
 impl Shape {
@@ -53,6 +73,8 @@ impl Shape {
             Geometry::Triangles(ref mesh) => Shape::Triangles(mesh.clone()),
             Geometry::Sphere { center, radius } => Shape::Quadric(Quadric::sphere(center, radius)),
             Geometry::Disk { center, normal, radius } => Shape::Quadric(Quadric::disk(center, normal, radius)),
+            Geometry::Cylinder { start, end, radius } => Shape::Quadric(Quadric::cylinder(start, end, radius)),
+            Geometry::Instance { ref of, to_world } => Shape::Instance(of.clone(), to_world),
         }
     }
 }
@@ -70,12 +92,27 @@ impl Drop for Scene {
     }
 }
 
+impl fmt::Debug for Scene {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Scene").field("geometries", &self.geometries).finish_non_exhaustive()
+    }
+}
+
 impl Scene {
     /// Flags and quality of all hierarchies, in Embree's words.
     pub const BUILT_WITH: &str = "scene flag ROBUST, build quality HIGH";
 
     /// Builds the hierarchy, with watertight intersections and at the highest quality.
     pub fn new(device: &Device, geometries: Vec<Geometry>) -> Result<Scene, EmbreeError> {
+        Scene::watched(device, geometries, &|_| ())
+    }
+
+    /// As [`new`](Self::new); `watch` is told, now and then, how much of the hierarchy is built, 0 to 1.
+    pub fn watched(
+        device: &Device,
+        geometries: Vec<Geometry>,
+        watch: &(dyn Fn(f64) + Sync),
+    ) -> Result<Scene, EmbreeError> {
         let functions = &device.embree().tracing;
         device.take_error(); // an earlier one would be taken for ours
         let count = geometries.len();
@@ -86,8 +123,9 @@ impl Scene {
             return Err(failed(device.take_error().unwrap_or("unknown error")));
         }
         // From here on the scene is released on every way out.
-        let scene =
-            Scene { device: device.clone(), handle, shapes: geometries.iter().map(Shape::new).collect(), geometries };
+        let shapes: Box<[Shape]> = geometries.iter().map(Shape::new).collect();
+        let has_instances = shapes.iter().any(|shape| matches!(shape, Shape::Instance(..)));
+        let scene = Scene { device: device.clone(), handle, geometries, shapes, has_instances };
         // SAFETY: the scene is alive and not shared yet.
         unsafe {
             (functions.set_scene_flags)(handle, ffi::SCENE_ROBUST);
@@ -96,8 +134,13 @@ impl Scene {
         for (id, shape) in (0..).zip(&scene.shapes) {
             scene.attach(shape, id).map_err(failed)?;
         }
-        // SAFETY: as above; the buffers that Embree reads from now on are held by `shapes`.
-        unsafe { (functions.commit_scene)(handle) };
+        // SAFETY: as above; the buffers that Embree reads from now on are held by `shapes`, and `watch` outlives the
+        // commit, after which nobody calls it.
+        unsafe {
+            (functions.set_progress_monitor)(handle, Some(tell), ptr::from_ref(&watch).cast_mut().cast());
+            (functions.commit_scene)(handle);
+            (functions.set_progress_monitor)(handle, None, ptr::null_mut());
+        }
         device.take_error().map_or(Ok(scene), |reason| Err(failed(reason)))
     }
 
@@ -120,6 +163,11 @@ impl Scene {
         &self.device
     }
 
+    /// Whether hits may lie in instances.
+    pub fn has_instances(&self) -> bool {
+        self.has_instances
+    }
+
     pub(super) fn handle(&self) -> SceneHandle {
         self.handle
     }
@@ -129,6 +177,7 @@ impl Scene {
         let kind = match shape {
             Shape::Triangles(_) => ffi::GEOMETRY_TRIANGLE,
             Shape::Quadric(_) => ffi::GEOMETRY_USER,
+            Shape::Instance(..) => ffi::GEOMETRY_INSTANCE,
         };
         // SAFETY: the device is alive; the new geometry is checked before it is used, and released once: the scene
         // holds its own reference.
@@ -140,6 +189,7 @@ impl Scene {
             match shape {
                 Shape::Triangles(mesh) => self.share_mesh(handle, mesh),
                 Shape::Quadric(quadric) => self.call_back(handle, quadric),
+                Shape::Instance(scene, to_world) => self.place(handle, scene, to_world),
             }
             (functions.commit_geometry)(handle);
             (functions.attach_geometry_by_id)(self.handle, handle, id);
@@ -166,7 +216,21 @@ impl Scene {
         }
     }
 
-    /// Lets Embree ask us about a sphere or disk.
+    /// Shows Embree a scene in another place.
+    ///
+    /// # Safety
+    /// `handle` is an instance geometry, and `scene` is one that `self.shapes` keeps alive.
+    unsafe fn place(&self, handle: GeometryHandle, scene: &Scene, to_world: &Affine3A) {
+        let functions = &self.device.embree().tracing;
+        let columns = to_world.to_cols_array();
+        // SAFETY: the scene is committed; Embree copies the matrix.
+        unsafe {
+            (functions.set_instanced_scene)(handle, scene.handle);
+            (functions.set_transform)(handle, 0, ffi::FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.as_ptr().cast());
+        }
+    }
+
+    /// Lets Embree ask us about a sphere, disk or cylinder.
     ///
     /// # Safety
     /// `handle` is a user geometry, and `quadric` stays in place as long as `self.shapes`.
@@ -181,4 +245,15 @@ impl Scene {
             (functions.set_occluded_function)(handle, quadric::occluded);
         }
     }
+}
+
+/// Tells a watcher how much is built.
+///
+/// # Safety
+/// To be called by Embree only, with the address of a `&(dyn Fn(f64) + Sync)`.
+unsafe extern "C" fn tell(watch: *mut c_void, done: f64) -> bool {
+    // SAFETY: the caller is Embree, see above.
+    let watch: &&(dyn Fn(f64) + Sync) = unsafe { &*watch.cast() };
+    watch(done);
+    true
 }

@@ -1,18 +1,21 @@
 //! OpenEXR files: what relt writes, and references to compare with.
 //!
-//! One part, 32-bit floats, ZIP compression (lossless). The image is in `R`, `G`, `B`; a further colour layer
-//! `name` is in `name.R`, `name.G`, `name.B`, a gray one in `name.Y`. Metadata are attributes `relt.NAME`, strings
+//! One part, 32-bit floats, ZIP compression (lossless). The image is in `R`, `G`, `B`, or in `Y` if it has no colours; a
+//! further colour layer `name` is in `name.R`, `name.G`, `name.B`, a gray one in `name.Y`. Values are as they were found:
+//! filters with negative lobes leave pixels below 0 beside edges. The display window is the whole picture, the data
+//! window the part of it that the file has. Metadata are attributes `relt.NAME`, strings
 //! or doubles; the prefix keeps them apart from the format's own.
 
 use std::path::Path;
 
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer};
-use exr::meta::attribute::{AttributeValue, Text};
-use exr::meta::header::LayerAttributes;
+use exr::math::Vec2;
+use exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
+use exr::meta::header::{ImageAttributes, LayerAttributes};
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
 
 use super::file::{FileError, write_whole};
-use super::image::{Image, Plane};
+use super::image::{Image, PixelFormat, Plane, Window};
 
 /// A piece of metadata.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +47,7 @@ impl From<f64> for Value {
 /// What an OpenEXR file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contents {
-    /// Channels `R`, `G`, `B`.
+    /// Channels `R`, `G`, `B`, each of them `Y` where the file has that in their place.
     pub image: Image,
     /// Further layers, sorted by name.
     pub layers: Vec<(String, Plane)>,
@@ -74,8 +77,10 @@ impl Contents {
 const PREFIX: &str = "relt.";
 /// Channel names of a colour.
 const RGB: [&str; 3] = ["R", "G", "B"];
+/// Channel name of an image without colours.
+const GRAY: &str = "Y";
 
-/// Writes an image with its layers and metadata.
+/// Writes a whole image in colour with its layers and metadata.
 ///
 /// # Panics
 /// If a layer's size is not the image's.
@@ -85,7 +90,27 @@ pub fn write(
     layers: &[(String, Plane)],
     metadata: &[(String, Value)],
 ) -> Result<(), FileError> {
-    let mut channels = rgb_channels("", image);
+    write_part(path, image, PixelFormat::Rgb, Window::on_whole(image.width, image.height), layers, metadata)
+}
+
+/// Writes an image that is a part of another one, or has no colours (of which the first channel tells all).
+///
+/// # Panics
+/// If a layer's size is not the image's.
+pub fn write_part(
+    path: &Path,
+    image: &Image,
+    format: PixelFormat,
+    window: Window,
+    layers: &[(String, Plane)],
+    metadata: &[(String, Value)],
+) -> Result<(), FileError> {
+    let mut channels = match format {
+        PixelFormat::Rgb => rgb_channels("", image),
+        PixelFormat::Luminance => {
+            vec![AnyChannel::new(text(GRAY), FlatSamples::F32(image.pixels.iter().map(|rgb| rgb[0]).collect()))]
+        }
+    };
     for (name, plane) in layers {
         match plane {
             Plane::Rgb(layer) => {
@@ -98,8 +123,10 @@ pub fn write(
             }
         }
     }
+    let [columns, rows] = window.offset.map(|pixels| pixels as i32);
     let mut attributes = LayerAttributes {
         software_name: Some(text(concat!("relt ", env!("CARGO_PKG_VERSION")))),
+        layer_position: Vec2(columns, rows),
         ..LayerAttributes::default()
     };
     for (name, value) in metadata {
@@ -112,8 +139,10 @@ pub fn write(
     let size = (image.width as usize, image.height as usize);
     let layer =
         Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into_iter().collect()));
+    let [width, height] = window.whole.map(|pixels| pixels as usize);
+    let whole = ImageAttributes::new(IntegerBounds::from_dimensions((width, height)));
     write_whole(path, |file| {
-        ExrImage::from_layer(layer).write().non_parallel().to_buffered(file).map_err(|error| error.to_string())
+        ExrImage::new(whole, layer).write().non_parallel().to_buffered(file).map_err(|error| error.to_string())
     })
 }
 
@@ -156,7 +185,10 @@ pub fn read_file(path: &Path) -> Result<Contents, FileError> {
             (_, Plane::Rgb(image)) => image,
             _ => unreachable!("the match above asks for colours"),
         },
-        None => return Err(FileError::read(path, "it has no channels R, G, B")),
+        None => match planes.iter().position(|(name, _)| name == GRAY).map(|root| planes.swap_remove(root)) {
+            Some((_, Plane::Gray(values))) => Image::new(width, height, values.iter().map(|y| [*y; 3]).collect()),
+            _ => return Err(FileError::read(path, "it has no channels R, G, B, nor Y")),
+        },
     };
     planes.sort_by(|a, b| a.0.cmp(&b.0));
     let mut metadata: Vec<_> = layer

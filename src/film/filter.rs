@@ -15,6 +15,20 @@ pub enum Filter {
         /// Standard deviation σ.
         stddev: f32,
     },
+    /// The two-parameter cubic of radius 2. With B = 0 and C = ½ it is the Catmull-Rom spline.
+    /// Source: Mitchell & Netravali 1988, "Reconstruction Filters in Computer Graphics", equation 8.
+    Mitchell {
+        /// B of the paper, blur; within [0, 1].
+        b: f32,
+        /// C of the paper, ringing; within [0, 1].
+        c: f32,
+    },
+    /// sinc(x) sinc(x/n) with sinc(x) = sin(πx)/(πx), within a radius of n.
+    /// Source: Duchon 1979, "Lanczos Filtering in One and Two Dimensions".
+    Lanczos {
+        /// n, ≥ 1.
+        lobes: u32,
+    },
 }
 
 impl Filter {
@@ -24,6 +38,19 @@ impl Filter {
             Filter::Box => 0.5,
             Filter::Tent { radius } => radius,
             Filter::Gaussian { stddev } => 4.0 * stddev,
+            Filter::Mitchell { .. } => 2.0,
+            Filter::Lanczos { lobes } => lobes as f32,
+        }
+    }
+
+    /// Whether h is negative anywhere, so that a pixel may be: beside an edge it swings below the darker side as it
+    /// does above the brighter one.
+    pub fn has_negative_lobes(self) -> bool {
+        match self {
+            Filter::Box | Filter::Tent { .. } | Filter::Gaussian { .. } => false,
+            // from 1 to 2, h = (2 − x)² (2B + 6C − (B + 6C) x)/6 changes its sign where C > 0, near 2
+            Filter::Mitchell { c, .. } => c > 0.0,
+            Filter::Lanczos { lobes } => lobes > 1,
         }
     }
 
@@ -37,8 +64,28 @@ impl Filter {
                 let bell = |x: f64| libm::exp(-x * x / (2.0 * f64::from(stddev).powi(2)));
                 (bell(x) - bell(radius)).max(0.0)
             }
+            Filter::Mitchell { b, c } => mitchell(x.abs(), f64::from(b), f64::from(c)),
+            Filter::Lanczos { .. } if x.abs() >= radius => 0.0,
+            Filter::Lanczos { .. } => sinc(x) * sinc(x / radius),
         }
     }
+}
+
+/// h of [`Filter::Mitchell`] at `x` ≥ 0.
+fn mitchell(x: f64, b: f64, c: f64) -> f64 {
+    if x < 1.0 {
+        ((12.0 - 9.0 * b - 6.0 * c) * x + (-18.0 + 12.0 * b + 6.0 * c)) * x * x / 6.0 + (3.0 - b) / 3.0
+    } else if x < 2.0 {
+        (2.0 - x) * (2.0 - x) * (2.0 * b + 6.0 * c - (b + 6.0 * c) * x) / 6.0
+    } else {
+        0.0
+    }
+}
+
+/// sin(πx)/(πx).
+fn sinc(x: f64) -> f64 {
+    let x = std::f64::consts::PI * x;
+    if x == 0.0 { 1.0 } else { libm::sin(x) / x }
 }
 
 /// Where samples on a film of a certain size go, and with which weights.
@@ -47,17 +94,20 @@ impl Filter {
 /// H_j = ∫ h(x − x_j) dx over the film: samples come from nowhere else, so near a border H_j is smaller. With x
 /// uniform over the w × h pixels of the film and splats scaled by w·h, the expectation of pixel j is
 /// ∫ L h(x − x_j) dx / ∫ h(x − x_j) dx. A weight-normalised image block, as Mitsuba's, converges to the same; but
-/// the weights here are known beforehand, so the estimate is unbiased and linear in L.
+/// the weights here are known beforehand, so the estimate is unbiased and linear in L. Weights of filters with negative
+/// lobes may be negative, and then so may pixels be; H_j is positive all the same, as ∫₀ˣ h is for every x > 0.
 ///
-/// h is tabulated as a function linear between 1024 nodes. For the tent this is the filter itself. For the Gaussian
-/// it differs from it by less than 2·10⁻⁶ of its peak (h″ ≤ 1/σ², steps of σ/256: 1/(8·256²)), and H_j is the
-/// integral of the tabulated function, so that a constant stays that constant.
+/// h is tabulated as a function linear between nodes. For the tent this is the filter itself. The others differ from it
+/// by |h″|/8 times the square of a step: less than 2·10⁻⁶ of the peak for the Gaussian (h″ ≤ 1/σ², steps of σ/256),
+/// 4·10⁻⁶ for Mitchell's (|h″| ≤ 6, steps of 1/512) and for Lanczos's (|h″| ≤ π²/2, such steps or smaller ones). H_j is
+/// the integral of the tabulated function, so that a constant stays that constant.
 #[derive(Clone, Debug)]
 pub struct Footprint {
     width: u32,
     height: u32,
     /// `None` for the box.
     bell: Option<Bell>,
+    negative_lobes: bool,
     /// 1/∫ h(x − x_j) dx for every column.
     columns: Vec<f32>,
     /// The same for every row.
@@ -74,6 +124,11 @@ impl Footprint {
     /// Whether every film position goes to one pixel.
     pub fn is_box(&self) -> bool {
         self.bell.is_none()
+    }
+
+    /// Whether weights may be negative.
+    pub fn has_negative_lobes(&self) -> bool {
+        self.negative_lobes
     }
 
     /// Prepares the filter for a film.
@@ -96,7 +151,7 @@ impl Footprint {
                 .collect(),
         };
         let (columns, rows) = (inverse_integrals(width), inverse_integrals(height));
-        Footprint { width, height, bell, columns, rows }
+        Footprint { width, height, bell, negative_lobes: filter.has_negative_lobes(), columns, rows }
     }
 
     /// Calls `f` with the row-major index of every pixel that a sample at column `x` and row `y` reaches, and the
@@ -136,7 +191,7 @@ impl Footprint {
     }
 }
 
-/// Nodes of the table between the centre and the radius.
+/// Nodes of the table between the centre and the radius; as many for every two pixels of a filter that oscillates.
 const NODES: usize = 1024;
 
 /// One side of a symmetric filter, linear between equidistant nodes.
@@ -144,6 +199,8 @@ const NODES: usize = 1024;
 struct Bell {
     radius: f32,
     nodes_per_pixel: f32,
+    /// Number of the last node, which lies at the radius.
+    last_node: f32,
     /// Value at each node and its difference to the next; a zero at the end serves distances of exactly the radius.
     table: Vec<[f32; 2]>,
     /// ∫ from 0 to each node, in pixels.
@@ -154,23 +211,27 @@ impl Bell {
     fn new(filter: Filter) -> Bell {
         let radius = filter.radius();
         assert!(radius.is_finite() && radius > 0.0, "{filter:?} has no extent");
-        let step = f64::from(radius) / NODES as f64;
-        let value = |node: usize| if node < NODES { filter.evaluate(node as f64 * step) as f32 } else { 0.0 };
-        let table: Vec<_> = (0..=NODES).map(|node| [value(node), value(node + 1) - value(node)]).collect();
-        let integrals = (0..=NODES)
+        let nodes = match filter {
+            Filter::Lanczos { lobes } => NODES * (lobes as usize).div_ceil(2),
+            _ => NODES,
+        };
+        let step = f64::from(radius) / nodes as f64;
+        let value = |node: usize| if node < nodes { filter.evaluate(node as f64 * step) as f32 } else { 0.0 };
+        let table: Vec<_> = (0..=nodes).map(|node| [value(node), value(node + 1) - value(node)]).collect();
+        let integrals = (0..=nodes)
             .scan(0.0, |sum, node| {
                 let before = *sum;
                 *sum += f64::from(value(node) + value(node + 1)) / 2.0 * step;
                 Some(before)
             })
             .collect();
-        Bell { radius, nodes_per_pixel: NODES as f32 / radius, table, integrals }
+        Bell { radius, nodes_per_pixel: nodes as f32 / radius, last_node: nodes as f32, table, integrals }
     }
 
     /// h(x).
     #[inline]
     fn evaluate(&self, x: f32) -> f32 {
-        let place = (x.abs() * self.nodes_per_pixel).min(NODES as f32);
+        let place = (x.abs() * self.nodes_per_pixel).min(self.last_node);
         let node = place as usize;
         let [value, slope] = self.table[node];
         value + slope * (place - node as f32)
@@ -178,8 +239,9 @@ impl Bell {
 
     /// ∫ h from 0 to `x` ≥ 0.
     fn integral(&self, x: f64) -> f64 {
-        let step = f64::from(self.radius) / NODES as f64;
-        let place = (x / step).min(NODES as f64);
+        let nodes = f64::from(self.last_node);
+        let step = f64::from(self.radius) / nodes;
+        let place = (x / step).min(nodes);
         let node = place as usize;
         let rest = place - node as f64;
         let [value, slope] = self.table[node].map(f64::from);
@@ -201,12 +263,23 @@ mod tests {
 
     #[test]
     fn the_table_is_as_close_to_the_filter_as_stated() {
-        for filter in [Filter::Tent { radius: 1.0 }, Filter::Tent { radius: 2.7 }, Filter::Gaussian { stddev: 0.5 }] {
+        for (filter, stated) in [
+            (Filter::Tent { radius: 1.0 }, 2e-6),
+            (Filter::Tent { radius: 2.7 }, 2e-6),
+            (Filter::Gaussian { stddev: 0.5 }, 2e-6),
+            (Filter::Mitchell { b: 0.0, c: 0.0 }, 4e-6),
+            (Filter::Mitchell { b: 0.0, c: 0.5 }, 4e-6),
+            (Filter::Mitchell { b: 1.0, c: 1.0 }, 4e-6),
+            (Filter::Lanczos { lobes: 1 }, 4e-6),
+            (Filter::Lanczos { lobes: 2 }, 4e-6),
+            (Filter::Lanczos { lobes: 3 }, 4e-6),
+            (Filter::Lanczos { lobes: 16 }, 4e-6),
+        ] {
             let bell = Bell::new(filter);
             for i in 0..100_000 {
                 let x = i as f32 * filter.radius() * 1e-5;
                 let error = f64::from(bell.evaluate(x)) - filter.evaluate(f64::from(x));
-                assert!(error.abs() < 2e-6, "{filter:?} at {x}: off by {error:e}");
+                assert!(error.abs() < stated, "{filter:?} at {x}: off by {error:e}");
             }
         }
     }
@@ -221,6 +294,79 @@ mod tests {
         // ∫ exp(−2x²) from 0 to 2 is √(π/8)·erf(2√2); erf(2√2) = 0.99993665751633.
         let expected = (std::f64::consts::PI / 8.0).sqrt() * 0.999_936_657_516_33 - 2.0 * (-8f64).exp();
         assert!((gaussian.integral(2.0) - expected).abs() < 2e-6, "{} {expected}", gaussian.integral(2.0));
+    }
+
+    /// At 0 the cubics are 1 − B/3 and at 1 they are B/6; the Catmull-Rom spline is (−1, 9, 9, −1)/16 at the halves.
+    /// sinc(½) sinc(1/6) = (2/π)(3/π), as sin(π/6) = ½.
+    #[test]
+    fn filters_have_the_values_that_one_gets_by_hand() {
+        let catmull_rom = Filter::Mitchell { b: 0.0, c: 0.5 };
+        let recommended = Filter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 };
+        let lanczos = Filter::Lanczos { lobes: 3 };
+        for (filter, x, expected) in [
+            (catmull_rom, 0.0, 1.0),
+            (catmull_rom, 0.5, 9.0 / 16.0),
+            (catmull_rom, 1.0, 0.0),
+            (catmull_rom, 1.5, -1.0 / 16.0),
+            (catmull_rom, 2.5, 0.0),
+            (recommended, 0.0, 8.0 / 9.0),
+            (recommended, 1.0, 1.0 / 18.0),
+            (Filter::Mitchell { b: 1.0, c: 0.0 }, 1.0, 1.0 / 6.0),
+            (lanczos, 0.0, 1.0),
+            (lanczos, 0.5, 6.0 / std::f64::consts::PI.powi(2)),
+            (lanczos, 2.0, 0.0),
+            (lanczos, 3.1, 0.0),
+        ] {
+            for x in [x, -x] {
+                let got = filter.evaluate(x);
+                assert!((got - expected).abs() < 1e-7, "{filter:?} at {x}: {got}, expected {expected}");
+            }
+        }
+    }
+
+    /// Copies of a cubic of the family at whole distances sum to 1, whatever B and C are.
+    #[test]
+    fn cubics_add_up_to_one() {
+        for (b, c) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.2, 0.7)] {
+            let filter = Filter::Mitchell { b, c };
+            for x in [0.0, 0.1, 0.5, 0.77] {
+                let sum: f64 = (-3..3).map(|j| filter.evaluate(x - f64::from(j))).sum();
+                assert!((sum - 1.0).abs() < 1e-6, "{filter:?} at {x}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_filter_says_whether_it_is_negative_anywhere() {
+        let mut filters = vec![Filter::Box, Filter::Tent { radius: 1.3 }, Filter::Gaussian { stddev: 0.5 }];
+        filters.extend((1..5).map(|lobes| Filter::Lanczos { lobes }));
+        filters.extend(
+            [0.0, 0.01, 0.5, 1.0]
+                .into_iter()
+                .flat_map(|b| [0.0, 0.01, 0.5, 1.0].map(|c| (b, c)))
+                .map(|(b, c)| Filter::Mitchell { b, c }),
+        );
+        for filter in filters {
+            // rounding of the sine leaves −10⁻¹⁷ at the zeros of a square
+            let least = (0..5000).map(|i| filter.evaluate(f64::from(i) * 1e-3)).fold(0.0, f64::min);
+            assert_eq!(filter.has_negative_lobes(), least < -1e-12, "{filter:?}: down to {least:e}");
+        }
+    }
+
+    #[test]
+    fn what_lies_on_the_film_is_positive_however_narrow_it_is() {
+        for filter in [
+            Filter::Mitchell { b: 0.0, c: 1.0 },
+            Filter::Mitchell { b: 1.0, c: 1.0 },
+            Filter::Lanczos { lobes: 2 },
+            Filter::Lanczos { lobes: 16 },
+        ] {
+            let bell = Bell::new(filter);
+            for i in 1..2000 {
+                let x = f64::from(i) * 0.01;
+                assert!(bell.integral(x) > 0.0, "{filter:?}: ∫ up to {x} is {}", bell.integral(x));
+            }
+        }
     }
 
     #[test]

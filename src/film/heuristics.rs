@@ -55,7 +55,8 @@ impl Heuristic {
         }
     }
 
-    /// One image of E_u and E_e; the same if they are exchanged. Values are finite and not negative.
+    /// One image of E_u and E_e; the same if they are exchanged. Values are finite. Where a filter with negative lobes
+    /// makes them negative, all this holds as it does above 0, with the maximum the one nearer to 0.
     ///
     /// # Panics
     /// If the images differ in size.
@@ -92,9 +93,9 @@ fn value(image: &Image, pixel: usize, channel: usize) -> f64 {
     f64::from(image.pixels[pixel][channel])
 }
 
-/// (x³ + y³)/(x² + y²), by the ratio of the smaller to the larger.
+/// (x³ + y³)/(x² + y²), by the ratio of the smaller to the larger in magnitude.
 fn power_mean(x: f64, y: f64) -> f64 {
-    let (small, large) = (x.min(y), x.max(y));
+    let (small, large) = if x.abs() < y.abs() { (x, y) } else { (y, x) };
     if large == 0.0 {
         return 0.0;
     }
@@ -160,28 +161,36 @@ mod tests {
         Image::new(13, 9, (0..13 * 9).map(|i| [3 * i, 3 * i + 1, 3 * i + 2].map(value)).collect())
     }
 
+    /// The same, with every third value below 0.
+    fn noise_of_both_signs(seed: u32) -> Image {
+        let mut image = noise(seed);
+        image.pixels.as_flattened_mut().iter_mut().skip(seed as usize).step_by(3).for_each(|value| *value = -*value);
+        image
+    }
+
     #[test]
     fn an_image_combined_with_itself_stays_the_same() {
         for heuristic in Heuristic::ALL {
-            assert_eq!(heuristic.combine(&noise(1), &noise(1)), noise(1), "{heuristic:?}");
+            for image in [noise(1), noise_of_both_signs(1)] {
+                assert_eq!(heuristic.combine(&image, &image), image, "{heuristic:?}");
+            }
         }
     }
 
     #[test]
     fn exchanging_the_images_changes_nothing() {
         for heuristic in Heuristic::ALL {
-            assert_eq!(
-                heuristic.combine(&noise(1), &noise(2)),
-                heuristic.combine(&noise(2), &noise(1)),
-                "{heuristic:?}"
-            );
+            for [a, b] in [[noise(1), noise(2)], [noise_of_both_signs(1), noise_of_both_signs(2)]] {
+                assert_eq!(heuristic.combine(&a, &b), heuristic.combine(&b, &a), "{heuristic:?}");
+            }
         }
     }
 
     #[test]
     fn every_value_lies_between_the_two() {
-        for heuristic in Heuristic::ALL {
-            let (a, b) = (noise(3), noise(4));
+        let pairs = [[noise(3), noise(4)], [noise_of_both_signs(3), noise_of_both_signs(4)]];
+        for (heuristic, [a, b]) in Heuristic::ALL.into_iter().flat_map(|h| pairs.each_ref().map(|pair| (h, pair))) {
+            let (a, b) = (a.clone(), b.clone());
             let combined = heuristic.combine(&a, &b);
             let pairs = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
             for (got, (a, b)) in combined.pixels.as_flattened().iter().zip(pairs) {
@@ -264,6 +273,13 @@ mod tests {
         ] {
             assert_eq!(heuristic.combine(&dark, &dark), dark, "{heuristic:?}");
             assert_eq!(heuristic.combine(&dark, &lit), gray(3, 3, &[expected; 9]), "{heuristic:?}");
+        }
+    }
+
+    #[test]
+    fn below_zero_the_power_heuristic_weighs_by_squares_as_well() {
+        for (x, y, expected) in [(-2.0, 0.0, -2.0), (-1.0, -3.0, -2.8), (3.0, -1.0, 2.6), (2.0, -2.0, 0.0)] {
+            assert!((power_mean(x, y) - expected).abs() < 1e-12, "{x}, {y}: {}", power_mean(x, y));
         }
     }
 

@@ -23,6 +23,36 @@ pub enum Plane {
     Gray(Vec<f32>),
 }
 
+/// What a pixel holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PixelFormat {
+    /// Red, green and blue.
+    #[default]
+    Rgb,
+    /// The relative luminance Y alone.
+    Luminance,
+}
+
+/// Where an image lies in a larger one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Width and height in pixels of the whole.
+    pub whole: [u32; 2],
+    /// Columns of the whole to the left of the image, and rows above it.
+    pub offset: [u32; 2],
+}
+
+impl Window {
+    /// Of an image that is the whole.
+    pub const fn on_whole(width: u32, height: u32) -> Window {
+        Window { whole: [width, height], offset: [0; 2] }
+    }
+}
+
+/// Relative luminance Y of linear RGB with Rec. 709 primaries and white D65 (ITU-R BT.709), in the six digits that
+/// Mitsuba has. Not [`LUMINANCE`], which is what chains follow.
+const RELATIVE_LUMINANCE: [f32; 3] = [0.212_671, 0.715_16, 0.072_169];
+
 impl Image {
     /// An image of the given pixels.
     ///
@@ -43,6 +73,12 @@ impl Image {
         self.pixels.iter().map(|rgb| rgb.iter().zip(LUMINANCE).map(|(value, weight)| value * weight).sum()).collect()
     }
 
+    /// The image as it looks without colours: every channel is the pixel's relative luminance Y.
+    pub fn without_colour(&self) -> Image {
+        let y = |rgb: &[f32; 3]| rgb.iter().zip(RELATIVE_LUMINANCE).map(|(value, weight)| value * weight).sum();
+        Image { pixels: self.pixels.iter().map(|rgb| [y(rgb); 3]).collect(), ..*self }
+    }
+
     /// Mean of each channel.
     pub fn mean(&self) -> [f64; 3] {
         let mut sums = [0.0; 3];
@@ -61,6 +97,8 @@ mod tests {
 
     #[test]
     fn white_has_luminance_one() {
-        assert!((Image::constant(1, 1, [1.0; 3]).luminance()[0] - 1.0).abs() < 1e-6);
+        let white = Image::constant(1, 1, [1.0; 3]);
+        assert!((white.luminance()[0] - 1.0).abs() < 1e-6);
+        assert!((white.without_colour().pixels[0][0] - 1.0).abs() < 1e-6);
     }
 }

@@ -17,4 +17,4 @@ pub use exr_file::Value;
 pub use file::FileError;
 pub use filter::{Filter, Footprint};
 pub use heuristics::Heuristic;
-pub use image::{Image, Plane};
+pub use image::{Image, PixelFormat, Plane, Window};

@@ -6,29 +6,37 @@
 pub(crate) mod faults;
 pub(crate) mod images;
 mod mitsuba;
+mod watch;
 
 use std::path::Path;
 
 pub use faults::{Fault, LoadError};
 pub(crate) use mitsuba::parse_ply;
+pub use watch::Watch;
 
 use crate::scene::SceneDescription;
 
-/// Makes a description of the scene from the text of a file at a path, with the `-D` values given.
-type Reader = fn(&Path, String, &[(String, String)]) -> Result<SceneDescription, LoadError>;
+/// Makes a description of the scene from the text of a file at a path, with the `-D` values given, and lets it be
+/// watched.
+type Reader = fn(&Path, String, &[(String, String)], &Watch) -> Result<SceneDescription, LoadError>;
 
 /// File name extensions and their readers.
 const FORMATS: &[(&str, Reader)] = &[("xml", mitsuba::read)];
 
 /// Reads the scene file at `path`; `defines` are `-D` names and values, which go before defaults in the file.
 pub fn scene(path: &Path, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {
+    watched(path, defines, &Watch::default())
+}
+
+/// As [`scene`]; `watch` tells others, while it lasts, how far it has come.
+pub fn watched(path: &Path, defines: &[(String, String)], watch: &Watch) -> Result<SceneDescription, LoadError> {
     let read = reader(path)?;
     let bytes = std::fs::read(path).map_err(|error| LoadError::of_file(path, format!("cannot be read: {error}")))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let place = error.utf8_error().valid_up_to();
         LoadError::of_file(path, format!("is not UTF-8 text: invalid at byte {place}"))
     })?;
-    read(path, text, defines)
+    read(path, text, defines, watch)
 }
 
 /// The reader of the format that the file name's extension stands for.

@@ -32,15 +32,18 @@ pub fn ln2_scaled_exp(x: f32) -> u32 {
     (p * scale) as u32
 }
 
+/// Where a coordinate counts as near zero in [`offset_origin`].
+const NEAR_ZERO: f32 = 1.0 / 32.0;
+/// How far that moves a coordinate near zero along a unit normal; other coordinates, by that part of them at least.
+const FLOAT_SCALE: f32 = 1.0 / 65536.0;
+
 /// A ray origin just off the surface at `p`, on the side that the vector `normal` points to.
 ///
 /// Moves by 256 units in the last place of each coordinate along the normal, or by a 65,536th near the
-/// coordinate's zero, so that the ray does not meet its own surface again.
+/// coordinate's zero, so that the ray does not meet its own surface again. A longer normal moves further: see [`lift`].
 /// Source: Wächter & Binder 2019, "A fast and robust method for avoiding self-intersection".
 #[inline(always)]
 pub fn offset_origin(p: Vec3, normal: Vec3) -> Vec3 {
-    const NEAR_ZERO: f32 = 1.0 / 32.0;
-    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
     const ULPS: f32 = 256.0;
     #[inline(always)]
     fn shift(p: f32, n: f32) -> f32 {
@@ -51,6 +54,18 @@ pub fn offset_origin(p: Vec3, normal: Vec3) -> Vec3 {
         f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -ulps } else { ulps }) as u32)
     }
     Vec3::new(shift(p.x, normal.x), shift(p.y, normal.y), shift(p.z, normal.z))
+}
+
+/// The unit `normal` made as long as it takes, and no shorter, for [`offset_origin`] to get off a surface whose points
+/// near `p` are known up to `error` in each coordinate.
+///
+/// Along the normal the surface is uncertain by Σ |nᵢ| δᵢ at most, and a unit normal moves by 2⁻¹⁶ Σ nᵢ² sᵢ at least,
+/// where sᵢ is |pᵢ|, or 1 near zero.
+#[inline(always)]
+pub fn lift(p: Vec3, normal: Vec3, error: Vec3) -> Vec3 {
+    let moves = |p: f32| if p.abs() < NEAR_ZERO { FLOAT_SCALE } else { FLOAT_SCALE * p.abs() };
+    let moved = (normal * normal).dot(Vec3::new(moves(p.x), moves(p.y), moves(p.z)));
+    normal * (normal.abs().dot(error) / moved).max(1.0)
 }
 
 #[cfg(test)]

@@ -4,5 +4,5 @@ mod elementary;
 mod frame;
 pub mod warp;
 
-pub use elementary::{ln2_scaled_exp, offset_origin, sin_cos_turn};
+pub use elementary::{lift, ln2_scaled_exp, offset_origin, sin_cos_turn};
 pub use frame::Frame;

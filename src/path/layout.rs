@@ -5,7 +5,8 @@ use crate::scene::{Features, description::Integrator};
 /// The primary dimensions of a camera path, laid out by bounce so that a small step in one decision moves that
 /// decision and no other.
 ///
-/// Block 0 is the film position. Each bounce has one block (direction: 2, place on a light: 2) and, only where the
+/// Block 0 is the film position and, where there is a lens, the place on it: a block has four dimensions whether they are
+/// used or not, so neither costs anything more. Each bounce has one block (direction: 2, place on a light: 2) and, only where the
 /// scene needs any of them, a second one (lobe, light, roulette).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
@@ -15,6 +16,7 @@ pub struct Layout {
     roulette_from: u16,
     /// Longest path in edges.
     max_depth: u16,
+    lens: bool,
     lobe_choice: bool,
     light_choice: bool,
 }
@@ -29,6 +31,7 @@ impl Layout {
             // a path has bounce + 1 edges when its roulette is played
             roulette_from: features.integrator.rr_depth.saturating_sub(1).min(Integrator::LONGEST) as u16,
             max_depth,
+            lens: features.lens,
             lobe_choice: features.lobe_choice,
             light_choice: features.light_choice(),
         }
@@ -57,6 +60,15 @@ impl Layout {
     #[inline(always)]
     pub fn roulette(&self, bounce: u16) -> bool {
         bounce >= self.roulette_from
+    }
+
+    /// Names of the dimensions that decide something before the first bounce, for people.
+    pub fn describe_camera(&self) -> Vec<&'static str> {
+        let mut names = vec!["film position", "film position"];
+        if self.lens {
+            names.extend(["place on lens", "place on lens"]);
+        }
+        names
     }
 
     /// Names of the dimensions that decide something at that bounce, for people.
@@ -88,8 +100,14 @@ mod tests {
     fn blocks_follow_each_other_without_gap_or_overlap() {
         for choices in [false, true] {
             for roulette_from in [0, 4, 100] {
-                let layout =
-                    Layout { choices, roulette_from, max_depth: 50, lobe_choice: choices, light_choice: false };
+                let layout = Layout {
+                    choices,
+                    roulette_from,
+                    max_depth: 50,
+                    lens: choices,
+                    lobe_choice: choices,
+                    light_choice: false,
+                };
                 let mut next = 1;
                 for bounce in 0..50 {
                     assert_eq!(layout.bounce(bounce), next);

@@ -25,8 +25,8 @@ pub fn evaluate<P: Profile>(
         proposals.draw(block, &lanes);
         proposals.block(block, lane)
     };
-    let [x, y, ..] = draw(0).map(unit_f32);
-    let mut ray = scene.camera.ray(x, y);
+    let [x, y, u, v] = draw(0).map(unit_f32);
+    let mut ray = scene.camera.ray([x, y], [u, v]);
     let mut carried = Carried::START;
     let mut radiance = Rgb::ZERO;
 

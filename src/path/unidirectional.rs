@@ -107,6 +107,7 @@ impl Replay {
         hits.u.clone_from(&answers.u);
         hits.v.clone_from(&answers.v);
         hits.t.clone_from(&answers.t);
+        hits.instance.clone_from(&answers.instance);
         self.next_hits = (self.next_hits + 1) % self.recorded.hits.len();
     }
 
@@ -180,7 +181,7 @@ fn evaluate<P: Profile>(
     settle(proposals, workspace, out);
 }
 
-/// Draws film positions and starts a path in every lane that does not rest.
+/// Draws film positions and places on the lens, and starts a path in every lane that does not rest.
 fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Workspace) {
     proposals.begin(&mut w.lanes);
     proposals.draw(0, &w.lanes);
@@ -190,8 +191,8 @@ fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Workspa
     w.radiance.resize(proposals.lanes(), Rgb::ZERO);
     w.film.resize(proposals.lanes(), [0.0; 2]);
     for &lane in &w.lanes {
-        let [x, y, ..] = proposals.block(0, lane as usize).map(unit_f32);
-        let ray = mapping.scene.camera.ray(x, y);
+        let [x, y, u, v] = proposals.block(0, lane as usize).map(unit_f32);
+        let ray = mapping.scene.camera.ray([x, y], [u, v]);
         w.film[lane as usize] = [x, y];
         w.rays.push(ray.origin, ray.direction, ray.tfar);
         w.carried.push(Carried::START);

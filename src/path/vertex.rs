@@ -114,7 +114,7 @@ pub(super) fn connection<P: Profile>(
     if !surface.scattering.is_smooth::<P>() {
         return None;
     }
-    let light = scene.emitters.sample::<P>(surface.p, surface.ng, decisions.light_place, decisions.light)?;
+    let light = scene.emitters.sample::<P>(surface.p, surface.lift, decisions.light_place, decisions.light)?;
     let Evaluation { value, pdf } = surface.scattering.evaluate::<P>(surface.wo, surface.frame.to_local(light.wi));
     let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
     (contribution != Rgb::ZERO).then_some(Connection {
@@ -142,7 +142,7 @@ pub(super) fn scatter<P: Profile>(surface: &Surface, carried: &Carried, decision
         return None;
     }
     let direction = surface.frame.to_world(wi);
-    let side = if surface.ng.dot(direction) >= 0.0 { surface.ng } else { -surface.ng };
+    let side = if surface.lift.dot(direction) >= 0.0 { surface.lift } else { -surface.lift };
     Some(Edge { origin: offset_origin(surface.p, side), direction, carried: next })
 }
 

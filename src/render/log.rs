@@ -232,8 +232,9 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::film::Image;
+    use crate::film::{Filter, Image};
     use crate::render::settings::{LadderChoice, Settings};
+    use crate::scene::description::FilmDescription;
 
     /// A file in memory that can be looked into.
     #[derive(Clone, Default)]
@@ -286,7 +287,8 @@ mod tests {
             ..RunStart::default()
         });
         log.progress(&status(2));
-        let picture = Picture { image: Image::constant(1, 1, [0.0; 3]), layers: vec![], metadata: vec![] };
+        let film = FilmDescription::new(1, 1, Filter::Box);
+        let picture = Picture::new(&film, Image::constant(1, 1, [0.0; 3]), vec![], vec![]);
         log.snapshot(&status(3), &picture);
         log.finished(&Summary {
             status: status(4),

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::settings::Method;
 use super::status::{RunStart, Status};
 use crate::film::file::{FileError, check_writable};
-use crate::film::{Image, Plane, Value, exr_file, png_file};
+use crate::film::{Image, PixelFormat, Plane, Value, Window, exr_file, png_file};
+use crate::scene::description::FilmDescription;
 use crate::tempering::{Normaliser, RoundReport, RungReport};
 
 /// An image with all that goes into its file.
@@ -13,10 +14,37 @@ use crate::tempering::{Normaliser, RoundReport, RungReport};
 pub struct Picture {
     /// The picture itself.
     pub image: Image,
+    /// What a pixel holds; without colours all channels of the image are the same.
+    pub format: PixelFormat,
+    /// Where it lies in the whole that it is a part of.
+    pub window: Window,
     /// Further layers by name, such as `uniform` and `density`.
     pub layers: Vec<(String, Plane)>,
     /// How it was made; see [`metadata`].
     pub metadata: Vec<(String, Value)>,
+}
+
+impl Picture {
+    /// A picture of that film.
+    pub fn new(
+        film: &FilmDescription,
+        image: Image,
+        layers: Vec<(String, Plane)>,
+        metadata: Vec<(String, Value)>,
+    ) -> Picture {
+        let (format, window) = (film.format, film.window);
+        match format {
+            PixelFormat::Rgb => Picture { image, format, window, layers, metadata },
+            PixelFormat::Luminance => {
+                let gray = |plane: Plane| match plane {
+                    Plane::Rgb(layer) => Plane::Gray(layer.without_colour().pixels.iter().map(|rgb| rgb[0]).collect()),
+                    gray => gray,
+                };
+                let layers = layers.into_iter().map(|(name, plane)| (name, gray(plane))).collect();
+                Picture { image: image.without_colour(), format, window, layers, metadata }
+            }
+        }
+    }
 }
 
 /// Where pictures go.
@@ -55,7 +83,8 @@ impl Output {
     /// Writes all files; each appears whole or not at all.
     pub fn write(&self, picture: &Picture) -> Result<(), FileError> {
         if let Some(exr) = &self.exr {
-            exr_file::write(exr, &picture.image, &picture.layers, &picture.metadata)?;
+            let Picture { image, format, window, layers, metadata } = picture;
+            exr_file::write_part(exr, image, *format, *window, layers, metadata)?;
         }
         png_file::write(&self.png, &picture.image)
     }
@@ -156,6 +185,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::film::Filter;
     use crate::render::Settings;
     use crate::tempering::{LnEstimate, NormaliserEstimates};
 
@@ -197,7 +227,8 @@ mod tests {
         };
         let image = Image::constant(4, 3, [0.5; 3]);
         let metadata = metadata(&start, &status);
-        output.write(&Picture { image: image.clone(), layers: Vec::new(), metadata }).unwrap();
+        let film = FilmDescription::new(4, 3, Filter::Box);
+        output.write(&Picture::new(&film, image.clone(), Vec::new(), metadata)).unwrap();
         let read = exr_file::read_file(&output.files()[0]).unwrap();
         assert_eq!(read.image, image);
         let value = |name: &str| read.metadata.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone());
@@ -213,6 +244,20 @@ mod tests {
         assert_eq!(value("ladder.normaliser.mbar_error"), Some(0.5.into()));
         assert_eq!(value("ladder.image_share_before"), None);
         assert!(output.files()[1].exists());
+    }
+
+    #[test]
+    fn a_picture_without_colours_has_none_in_its_layers_either() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = Output::new(&folder.path().join("gray.exr")).unwrap();
+        let film = FilmDescription { format: PixelFormat::Luminance, ..FilmDescription::new(4, 3, Filter::Box) };
+        let [red, white] = [[1.0, 0.0, 0.0], [2.0; 3]].map(|rgb| Image::constant(4, 3, rgb));
+        let layers = vec![("density".into(), Plane::Gray(vec![7.0; 12])), ("uniform".into(), Plane::Rgb(white))];
+        output.write(&Picture::new(&film, red, layers, Vec::new())).unwrap();
+        let read = exr_file::read_file(&output.files()[0]).unwrap();
+        assert_eq!(read.image, Image::constant(4, 3, [0.212_671; 3]), "Y of red");
+        assert_eq!(read.gray("density"), Some(&[7.0; 12][..]));
+        assert!(read.gray("uniform").unwrap().iter().all(|y| (y - 2.0).abs() < 1e-6), "{read:?}");
     }
 
     #[test]

@@ -177,7 +177,7 @@ fn work(
                 let normalisation = development.normalisation.map(|e| (e.value, e.standard_error));
                 let status = Status { normalisation, ..status.clone() };
                 let metadata = metadata(start, &status);
-                let picture = Picture { image: development.image, layers: development.layers, metadata };
+                let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
                 observer.snapshot(&status, &picture);
             };
             if observer.stops_the_clock() { watch.clock.pause(look) } else { look() }
@@ -226,7 +226,8 @@ fn conclude(
             status.non_finite, status.mutations
         ));
     }
-    let picture = Picture { image: development.image, layers: development.layers, metadata: metadata(start, &status) };
+    let metadata = metadata(start, &status);
+    let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
     Outcome { picture, status, interrupted, warnings }
 }
 

@@ -110,7 +110,7 @@ mod tests {
         rng::{Counter, Purpose, Rng, unit_f32},
         scene::{
             FullProfile, Mesh,
-            lights::{Constant, Disk, MeshLight, Sphere},
+            lights::{Constant, Cylinder, Disk, MeshLight, Sphere},
             textures::Varying,
         },
     };
@@ -122,10 +122,19 @@ mod tests {
         let sphere = |center: Vec3, radius: f32, flipped: bool| {
             Light::Sphere(Sphere { center, radius, axes: Mat3::IDENTITY, flipped, radiance: Rgb::ONE.into() })
         };
-        let Frame { s, t, n } = Frame::new(Vec3::new(0.6, 0.0, -0.8));
-        let disk_axes = Mat3::from_cols(s, t, n);
+        let axes = |n: Vec3| {
+            let Frame { s, t, n } = Frame::new(n);
+            Mat3::from_cols(s, t, n)
+        };
+        let disk_axes = axes(Vec3::new(0.6, 0.0, -0.8));
+        let cylinder = |start: Vec3, end: Vec3, radius: f32, flipped: bool| {
+            let (axis, length) = (end - start).normalize_and_length();
+            Light::Cylinder(Cylinder { start, length, radius, axes: axes(axis), flipped, radiance: Rgb::ONE.into() })
+        };
         vec![
             Light::Constant(Constant { radiance: Rgb::ONE }),
+            cylinder(Vec3::new(0.0, -0.6, -0.8), Vec3::new(0.0, 0.6, 0.8), 0.5, true),
+            cylinder(Vec3::new(-1.0, 1.0, 2.0), Vec3::new(2.0, 0.0, 1.0), 0.6, false),
             Light::Disk(Disk::new(Vec3::new(0.3, 0.0, 2.0), 0.7, disk_axes, white.clone())),
             Light::MeshLight(MeshLight::new(Mesh::new(corners, vec![[0, 2, 1]]).into(), white)),
             sphere(Vec3::new(0.0, 1.0, 2.0), 0.8, false),
@@ -146,8 +155,11 @@ mod tests {
         };
         let sphere = std::f64::consts::TAU * (1.0 - (1.0f64 - 0.64 / 5.0).sqrt());
         let full = 4.0 * std::f64::consts::PI;
+        // seen from the middle of a tube of half length 1 and radius ½: all but its two ends
+        let tube = full / 1.25f64.sqrt();
+        let exact = [Some(full), Some(tube), None, None, Some(triangle), Some(sphere), Some(full)];
         let rng = Rng::new(2);
-        for (light, solid_angle) in lights().iter().zip([Some(full), None, Some(triangle), Some(sphere), Some(full)]) {
+        for (light, solid_angle) in lights().iter().zip(exact) {
             let n = 1 << 16;
             let mut sum = 0.0;
             for step in 0..n {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::Appearance;
-use super::description::{Integrator, SceneDescription, ShapeGeometry};
+use super::description::{Integrator, Projection, SceneDescription, ShapeGeometry};
 use super::lights::Light;
 use super::materials::Lobes;
 use super::textures::Varying;
@@ -28,10 +28,14 @@ pub struct Features {
     pub directional_lights: usize,
     /// Lights at infinity.
     pub infinite_lights: usize,
-    /// Triangle meshes, those with shading normals, spheres, disks.
+    /// Shapes of each kind, those of groups counted once.
     pub shapes: ShapeCounts,
-    /// Triangles of all meshes.
+    /// Places of groups of shapes.
+    pub instances: usize,
+    /// Triangles of all meshes, those of groups counted once.
     pub triangles: usize,
+    /// The camera has a lens, which takes two primary dimensions.
+    pub lens: bool,
     /// Textures of materials, weights, reliefs and lights.
     pub textures: usize,
     /// Surfaces' sides that mix several materials.
@@ -55,6 +59,15 @@ pub struct ShapeCounts {
     pub spheres: usize,
     /// Exact disks.
     pub disks: usize,
+    /// Exact cylinders.
+    pub cylinders: usize,
+}
+
+impl ShapeCounts {
+    /// Those that Embree asks us about.
+    pub fn quadrics(&self) -> usize {
+        self.spheres + self.disks + self.cylinders
+    }
 }
 
 impl Features {
@@ -75,7 +88,7 @@ impl Features {
             appearances.iter().flat_map(Appearance::textures).chain(of_lights).map(Arc::as_ptr).collect();
         let mut shapes = ShapeCounts::default();
         let mut triangles = 0;
-        for shape in &description.shapes {
+        for shape in description.all_shapes() {
             match &shape.geometry {
                 ShapeGeometry::Mesh(mesh) => {
                     triangles += mesh.triangles.len();
@@ -83,6 +96,7 @@ impl Features {
                 }
                 ShapeGeometry::Sphere { .. } => shapes.spheres += 1,
                 ShapeGeometry::Disk { .. } => shapes.disks += 1,
+                ShapeGeometry::Cylinder { .. } => shapes.cylinders += 1,
             }
         }
         let count = |is: fn(&Light) -> bool| description.lights.iter().filter(|l| is(l)).count();
@@ -96,7 +110,9 @@ impl Features {
             directional_lights: count(|l| matches!(l, Light::Directional(_))),
             infinite_lights: count(Light::is_surrounding),
             shapes,
+            instances: description.instances.len(),
             triangles,
+            lens: matches!(description.camera.projection, Projection::Perspective { lens: Some(_), .. }),
             textures: textures.len(),
             mixtures: appearances.iter().filter(|a| a.parts().len() > 1).count(),
             reliefs: parts().filter(|part| part.relief.is_some()).count(),
@@ -118,6 +134,8 @@ impl Features {
             (shapes.smooth_meshes, "meshes with shading normals"),
             (shapes.spheres, "spheres"),
             (shapes.disks, "disks"),
+            (shapes.cylinders, "cylinders"),
+            (self.instances, "instances"),
             (self.area_lights, "area lights"),
             (self.point_lights, "point lights"),
             (self.directional_lights, "directional lights"),
@@ -126,6 +144,9 @@ impl Features {
             if n > 0 {
                 words.push(format!("{n} {what}"));
             }
+        }
+        if self.lens {
+            words.push("lens".to_owned());
         }
         words.push(format!("{} kernel", self.kernel().name()));
         words
@@ -171,6 +192,8 @@ impl Features {
             (self.shapes.smooth_meshes, "shading normals"),
             (self.shapes.spheres, "spheres"),
             (self.shapes.disks, "disks"),
+            (self.shapes.cylinders, "cylinders"),
+            (self.instances, "instances"),
             (self.point_lights, "point lights"),
             (self.directional_lights, "directional lights"),
             (self.infinite_lights, "lights at infinity"),
@@ -206,7 +229,7 @@ impl Kernel {
 pub trait Profile {
     /// All materials are diffuse.
     const DIFFUSE: bool;
-    /// All shapes are triangle meshes without shading normals, so are all lights.
+    /// All shapes are triangle meshes without shading normals, so are all lights, and there are no instances.
     const FLAT_MESHES: bool;
     /// Surfaces may vary from place to place: textures, mixtures, bent normals, tangents that matter.
     const VARYING: bool;

@@ -21,6 +21,7 @@ impl Mesh {
     /// A mesh of flat triangles; add `normals` and `uvs` afterwards where there are any.
     pub fn new(mut positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
         debug_assert!(triangles.iter().flatten().all(|&i| (i as usize) < positions.len()));
+        positions.reserve_exact(1); // and not twice as much as there is
         positions.push(Vec3::ZERO);
         Mesh { positions, normals: Vec::new(), uvs: Vec::new(), triangles }
     }

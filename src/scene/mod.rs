@@ -7,6 +7,7 @@ mod camera;
 pub mod description;
 mod emitters;
 mod features;
+mod instances;
 pub mod lights;
 pub mod materials;
 pub mod mesh;
@@ -25,7 +26,8 @@ pub use mesh::Mesh;
 pub use surface::{NO_LIGHT, Surface};
 
 use crate::embree;
-use description::{FilmDescription, Integrator, ShapeGeometry, Sides};
+use description::{FilmDescription, Integrator, ShapeDescription, ShapeGeometry, Sides};
+use instances::Instances;
 use materials::Material;
 use surface::Shape;
 use textures::Varying;
@@ -47,7 +49,9 @@ pub struct Scene {
     pub features: Features,
     /// The acceleration structure.
     pub tracer: embree::Scene,
+    /// In the world first, then those of groups.
     shapes: Vec<Shape>,
+    instances: Instances,
     appearances: Vec<Appearance>,
     /// The scattering function of each appearance that has a plain one (of others, that of their first part).
     materials: Vec<Material>,
@@ -56,34 +60,28 @@ pub struct Scene {
 impl Scene {
     /// Builds the acceleration structure and look-up tables. Errors are Embree's: memory, mostly.
     pub fn new(device: &embree::Device, description: SceneDescription) -> Result<Scene, embree::EmbreeError> {
+        Scene::watched(device, description, &|_| ())
+    }
+
+    /// As [`new`](Self::new); `watch` is told, now and then, how much of the acceleration structure is built, 0 to 1.
+    pub fn watched(
+        device: &embree::Device,
+        description: SceneDescription,
+        watch: &(dyn Fn(f64) + Sync),
+    ) -> Result<Scene, embree::EmbreeError> {
         let features = Features::of(&description);
-        let geometries = description.shapes.iter().map(|s| geometry(&s.geometry)).collect();
-        let tracer = embree::Scene::new(device, geometries)?;
+        let groups = instances::trace_groups(device, &description.groups)?;
+        let mut geometries = geometries(&description.shapes);
+        geometries.extend(description.instances.iter().map(|instance| embree::Geometry::Instance {
+            of: groups[instance.group].clone(),
+            to_world: instance.to_world,
+        }));
+        let tracer = embree::Scene::watched(device, geometries, watch)?;
         let radius = tracer.bounds().map_or(1.0, |(low, high)| 0.5 * (high - low).length());
         let (emitters, light_of_shape) = Emitters::new(&description, radius);
-        let shapes = description
-            .shapes
-            .iter()
-            .zip(light_of_shape)
-            .map(|(shape, light)| {
-                let (appearances, two_sided) = match shape.sides {
-                    Sides::One(m) => ([m, m], false),
-                    Sides::Two { front, back } => ([front, back], true),
-                };
-                let depends = |m: u32| {
-                    let appearance = &description.appearances[m as usize];
-                    appearance.plain().is_none() || appearance.needs_tangents()
-                };
-                Shape {
-                    kind: surface::Kind::new(&shape.geometry),
-                    appearances,
-                    two_sided,
-                    light: light.unwrap_or(NO_LIGHT),
-                    varies: shape.emission.as_ref().is_some_and(Varying::is_textured)
-                        || appearances.into_iter().any(depends),
-                }
-            })
-            .collect();
+        let lights = light_of_shape.into_iter().chain(std::iter::repeat(None)); // shapes of groups do not emit
+        let surface = |(shape, light)| surface_of(shape, light, &description.appearances);
+        let shapes = description.all_shapes().zip(lights).map(surface).collect();
         Ok(Scene {
             integrator: description.integrator,
             film: description.film,
@@ -92,6 +90,7 @@ impl Scene {
             features,
             tracer,
             shapes,
+            instances: Instances::new(&description),
             materials: description.appearances.iter().map(|a| a.parts()[0].material).collect(),
             appearances: description.appearances,
         })
@@ -103,10 +102,31 @@ impl Scene {
     }
 }
 
-fn geometry(g: &ShapeGeometry) -> embree::Geometry {
-    match g {
+/// The surface that a shape is.
+fn surface_of(shape: &ShapeDescription, light: Option<u32>, all: &[Appearance]) -> Shape {
+    let (appearances, two_sided) = match shape.sides {
+        Sides::One(m) => ([m, m], false),
+        Sides::Two { front, back } => ([front, back], true),
+    };
+    let depends = |m: u32| all[m as usize].plain().is_none() || all[m as usize].needs_tangents();
+    Shape {
+        kind: surface::Kind::new(&shape.geometry),
+        appearances,
+        two_sided,
+        light: light.unwrap_or(NO_LIGHT),
+        varies: shape.emission.as_ref().is_some_and(Varying::is_textured) || appearances.into_iter().any(depends),
+    }
+}
+
+/// What Embree is given.
+fn geometries(shapes: &[ShapeDescription]) -> Vec<embree::Geometry> {
+    let geometry = |shape: &ShapeDescription| match &shape.geometry {
         ShapeGeometry::Mesh(mesh) => embree::Geometry::Triangles(mesh.clone()),
         &ShapeGeometry::Sphere { center, radius, .. } => embree::Geometry::Sphere { center, radius },
         &ShapeGeometry::Disk { center, radius, axes } => embree::Geometry::Disk { center, normal: axes.z_axis, radius },
-    }
+        &ShapeGeometry::Cylinder { start, length, radius, axes, .. } => {
+            embree::Geometry::Cylinder { start, end: start + axes.z_axis * length, radius }
+        }
+    };
+    shapes.iter().map(geometry).collect()
 }

@@ -45,6 +45,8 @@ pub trait Parameters {
     fn to_world(&mut self) -> Affine3A;
     /// The element's `to_uv` transform of surface coordinates, identity where absent: what it does to x and y.
     fn to_uv(&mut self) -> glam::Affine2;
+    /// Whether a texture is in the place of a parameter that has been asked for.
+    fn varies(&self, name: &str) -> bool;
     /// The picture in the file of that name.
     fn image(&mut self, name: &str) -> Option<Arc<Image>>;
     /// Reports a fault of the named parameter (of the element as a whole where the name is absent).

@@ -83,6 +83,20 @@ pub(super) fn disk_uv(axes: &Mat3, radius: f32, from_centre: Vec3) -> Vec2 {
     Vec2::new(local.length(), turn(local))
 }
 
+/// On a cylinder of that length, at `from_start` in the world; `axes` as for spheres, with its own axis as the third. u is
+/// the part of a turn from the x axis on, v the part of the length.
+pub(super) fn of_cylinder(axes: &Mat3, length: f32, from_start: Vec3) -> Place {
+    let local = axes.transpose() * from_start;
+    let du = TAU * Vec3::new(-local.y, local.x, 0.0);
+    Place { uv: cylinder_uv(axes, length, from_start), du: *axes * du, dv: axes.z_axis * length }
+}
+
+/// The surface coordinates of [`of_cylinder`].
+pub(super) fn cylinder_uv(axes: &Mat3, length: f32, from_start: Vec3) -> Vec2 {
+    let local = axes.transpose() * from_start;
+    Vec2::new(turn(local.truncate()), local.z / length)
+}
+
 /// The part of a turn, within [0, 1), from the x axis to a vector.
 fn turn(v: Vec2) -> f32 {
     let turn = libm::atan2f(v.y, v.x) / TAU;
@@ -152,6 +166,31 @@ mod tests {
             axes * Vec3::new(cos, sin, 0.0) * (radius * uv.x)
         };
         check(point, of_disk(&axes, radius, point(Vec2::new(0.7, 0.4))));
+    }
+
+    #[test]
+    fn tangents_of_cylinders_follow_their_coordinates() {
+        let (axes, radius, length) = (axes(), 0.7, 3.0);
+        let point = |uv: Vec2| {
+            let (sin, cos) = (TAU * uv.x).sin_cos();
+            axes * Vec3::new(radius * cos, radius * sin, length * uv.y)
+        };
+        for uv in [Vec2::new(0.1, 0.3), Vec2::new(0.7, 0.9), Vec2::new(0.45, 0.5)] {
+            let place = of_cylinder(&axes, length, point(uv));
+            assert!((place.uv - uv).length() < 1e-5, "{place:?} for {uv}");
+            check(point, place);
+        }
+    }
+
+    /// By Mitsuba 3.9.1, of the cylinder from the origin to (1, 2, 0.5) of radius 0.4: it has the axes of Duff's frame.
+    #[test]
+    fn coordinates_of_cylinders_are_those_of_mitsuba() {
+        let axis = Vec3::new(1.0, 2.0, 0.5);
+        let Frame { s, t, n } = Frame::new(axis.normalize());
+        let place = of_cylinder(&Mat3::from_cols(s, t, n), axis.length(), Vec3::new(0.5, 1.0, 0.6599));
+        let near = |a: Vec3, b: [f32; 3]| (a - Vec3::from(b)).length() < 2e-3;
+        assert!((place.uv - Vec2::new(0.6762, 0.539)).length() < 1e-4, "{place:?}");
+        assert!(near(place.du, [2.248, -1.124, 0.0]) && near(place.dv, [1.0, 2.0, 0.5]), "{place:?}");
     }
 
     /// By Mitsuba 3.9.1, of a unit sphere, disk scaled by 2 in all directions.

@@ -10,8 +10,8 @@ use super::{
     parametrisation::{self, Place},
 };
 use crate::{
-    embree::Hit,
-    math::Frame,
+    embree::{Hit, MISS},
+    math::{Frame, lift},
     scene::{Mesh, description::ShapeGeometry},
 };
 
@@ -38,6 +38,28 @@ pub(super) enum Kind {
     Smooth(Arc<Mesh>),
     Sphere { center: Vec3, radius: f32, axes: Mat3, flipped: bool },
     Disk { center: Vec3, radius: f32, axes: Mat3 },
+    Cylinder { start: Vec3, length: f32, radius: f32, axes: Mat3, flipped: bool },
+}
+
+/// A hit, before it is known from which side.
+struct Point {
+    p: Vec3,
+    /// Unit geometric normal of the front.
+    ng: Vec3,
+    /// Unit shading normal.
+    ns: Vec3,
+    /// As in [`Surface`].
+    lift: Vec3,
+    /// `p` and `ng` in the shape's own coordinates, which are those of its group.
+    own: [Vec3; 2],
+}
+
+impl Point {
+    /// Of a shape in the world.
+    #[inline(always)]
+    fn new(p: Vec3, ng: Vec3, ns: Vec3) -> Point {
+        Point { p, ng, ns, lift: ng, own: [p, ng] }
+    }
 }
 
 impl Kind {
@@ -47,17 +69,67 @@ impl Kind {
             ShapeGeometry::Mesh(mesh) => Kind::Smooth(mesh.clone()),
             &ShapeGeometry::Sphere { center, radius, axes, flipped } => Kind::Sphere { center, radius, axes, flipped },
             &ShapeGeometry::Disk { center, radius, axes } => Kind::Disk { center, radius, axes },
+            &ShapeGeometry::Cylinder { start, length, radius, axes, flipped } => {
+                Kind::Cylinder { start, length, radius, axes, flipped }
+            }
         }
     }
 
-    /// Where on the surface a ray hit it at `p`.
-    fn place(&self, hit: Hit, p: Vec3, ng: Vec3) -> Place {
+    /// Where a ray in the shape's own coordinates hit it.
+    #[inline(always)]
+    fn point<P: Profile>(&self, hit: Hit, origin: Vec3, direction: Vec3) -> Point {
+        match self {
+            Kind::Flat(mesh) => {
+                let (p, ng) = flat(mesh, hit);
+                Point::new(p, ng, ng)
+            }
+            _ if P::FLAT_MESHES => unreachable!("a profile with flat meshes only"),
+            Kind::Smooth(mesh) => {
+                let (p, ng) = flat(mesh, hit);
+                Point::new(p, ng, mesh.shading_normal(hit.primitive, hit.u, hit.v, ng))
+            }
+            &Kind::Sphere { center, radius, flipped, .. } => {
+                let outside = (origin + direction * hit.t - center).normalize();
+                let n = if flipped { -outside } else { outside };
+                Point::new(center + outside * radius, n, n)
+            }
+            Kind::Disk { center, axes, .. } => {
+                let (p, n) = (origin + direction * hit.t, axes.z_axis);
+                Point::new(p - n * (p - center).dot(n), n, n) // t is the less exact the further it is
+            }
+            &Kind::Cylinder { start, radius, axes, flipped, .. } => {
+                let from_start = origin + direction * hit.t - start;
+                let along = axes.z_axis * from_start.dot(axes.z_axis);
+                let outside = (from_start - along).normalize();
+                let n = if flipped { -outside } else { outside };
+                Point::new(start + along + outside * radius, n, n)
+            }
+        }
+    }
+
+    /// Where on the surface a ray hit it at `p`, in its own coordinates.
+    fn place(&self, hit: Hit, [p, ng]: [Vec3; 2]) -> Place {
         match self {
             Kind::Flat(mesh) | Kind::Smooth(mesh) => parametrisation::of_mesh(mesh, hit.primitive, hit.u, hit.v, ng),
             Kind::Sphere { center, radius, axes, .. } => {
                 parametrisation::of_sphere(axes, *radius, (p - *center).normalize())
             }
             Kind::Disk { center, radius, axes } => parametrisation::of_disk(axes, *radius, p - *center),
+            Kind::Cylinder { start, length, axes, .. } => parametrisation::of_cylinder(axes, *length, p - *start),
+        }
+    }
+
+    /// Coordinates that bound those of the shape near a hit, for estimates of rounding errors.
+    #[inline(always)]
+    fn extent(&self, hit: Hit) -> Vec3 {
+        match self {
+            Kind::Flat(mesh) | Kind::Smooth(mesh) => {
+                mesh.corners(hit.primitive).into_iter().fold(Vec3::ZERO, |most, corner| most.max(corner.abs()))
+            }
+            Kind::Sphere { center: middle, radius: size, .. } | Kind::Disk { center: middle, radius: size, .. } => {
+                middle.abs() + *size
+            }
+            Kind::Cylinder { start, length, radius, .. } => start.abs() + (length + radius),
         }
     }
 }
@@ -69,6 +141,9 @@ pub struct Surface<'s> {
     pub p: Vec3,
     /// Unit geometric normal, of the front.
     pub ng: Vec3,
+    /// The geometric normal with the length that [`offset_origin`](crate::math::offset_origin) needs to get off the
+    /// surface: 1, and more where the position is less exact, as in instances.
+    pub lift: Vec3,
     /// Shading frame; its normal points to the side of `wo` where both sides are seen as fronts.
     pub frame: Frame,
     /// Direction to where the ray came from, in `frame`.
@@ -85,36 +160,26 @@ impl Scene {
     /// The surface that a ray hit.
     #[inline(always)]
     pub fn surface<P: Profile>(&self, hit: Hit, origin: Vec3, direction: Vec3) -> Surface<'_> {
-        let shape = &self.shapes[hit.geometry as usize];
-        let (p, ng, ns) = match &shape.kind {
-            Kind::Flat(mesh) => {
-                let (p, ng) = flat(mesh, hit);
-                (p, ng, ng)
-            }
-            _ if P::FLAT_MESHES => unreachable!("a profile with flat meshes only"),
-            Kind::Smooth(mesh) => {
-                let (p, ng) = flat(mesh, hit);
-                (p, ng, mesh.shading_normal(hit.primitive, hit.u, hit.v, ng))
-            }
-            &Kind::Sphere { center, radius, flipped, .. } => {
-                let outside = (origin + direction * hit.t - center).normalize();
-                let n = if flipped { -outside } else { outside };
-                (center + outside * radius, n, n)
-            }
-            Kind::Disk { axes, .. } => (origin + direction * hit.t, axes.z_axis, axes.z_axis),
+        let (shape, point) = if !P::FLAT_MESHES && hit.instance != MISS {
+            self.instanced::<P>(hit, origin, direction)
+        } else {
+            let shape = &self.shapes[hit.geometry as usize];
+            (shape, shape.kind.point::<P>(hit, origin, direction))
         };
         // as in Mitsuba the shading normal decides the side, of scattering as of emission
+        let ns = point.ns;
         let back = ns.dot(direction) >= 0.0;
         let flip = back && shape.two_sided;
         let index = shape.appearances[usize::from(back)] as usize;
         let frame = Frame::new(if flip { -ns } else { ns });
         let light = if back { NO_LIGHT } else { shape.light };
         if P::VARYING && shape.varies {
-            return self.varying_surface(shape, hit, direction, [p, ng, ns], flip, index, light);
+            return self.varying_surface(shape, hit, direction, &point, flip, index, light);
         }
         Surface {
-            p,
-            ng,
+            p: point.p,
+            ng: point.ng,
+            lift: point.lift,
             frame,
             wo: frame.to_local(-direction),
             uv: Vec2::ZERO,
@@ -130,12 +195,16 @@ impl Scene {
         shape: &Shape,
         hit: Hit,
         direction: Vec3,
-        [p, ng, ns]: [Vec3; 3],
+        point: &Point,
         flip: bool,
         index: usize,
         light: u32,
     ) -> Surface<'_> {
-        let place = shape.kind.place(hit, p, ng);
+        let &Point { p, ng, ns, lift, own } = point;
+        let mut place = shape.kind.place(hit, own);
+        if hit.instance != MISS {
+            place = self.instances.get(hit.instance).place_to_world(&place);
+        }
         // The x axis lies along ∂p/∂u. Seen from behind only the normal turns round: a mirror image, as in Mitsuba.
         let s = place.du - ns * ns.dot(place.du);
         let mut frame = match s.try_normalize() {
@@ -152,7 +221,21 @@ impl Scene {
             Some(_) => Scattering::Plain(&self.materials[index]),
             None => Scattering::Mixed(appearance.at(&place, &unturned, ng, wo)),
         };
-        Surface { p, ng, frame, wo, uv: place.uv, scattering, light }
+        Surface { p, ng, lift, frame, wo, uv: place.uv, scattering, light }
+    }
+}
+
+impl Scene {
+    /// A hit in an instance.
+    #[inline(never)] // few scenes have instances, and the others shall not carry this through their registers
+    fn instanced<P: Profile>(&self, hit: Hit, origin: Vec3, direction: Vec3) -> (&Shape, Point) {
+        let instance = self.instances.get(hit.instance);
+        let shape = &self.shapes[(instance.first_shape + hit.geometry) as usize];
+        let (origin, direction) = instance.ray_to_group(origin, direction);
+        let Point { p: q, ng, ns, own, .. } = shape.kind.point::<P>(hit, origin, direction);
+        let (p, ng, ns) = (instance.point_to_world(q), instance.normal_to_world(ng), instance.normal_to_world(ns));
+        let error = instance.error(p, shape.kind.extent(hit));
+        (shape, Point { p, ng, ns, lift: lift(p, ng, error), own })
     }
 }
 

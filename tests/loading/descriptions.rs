@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::files::{Folder, around, mesh, scene_beside, scene_with, shape};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use relt::film::Filter;
-use relt::scene::description::{FovAxis, ShapeDescription, ShapeGeometry, Sides};
+use relt::scene::description::{FovAxis, Projection, ShapeDescription, ShapeGeometry, Sides};
 use relt::scene::lights::{Constant, Light, Point};
 use relt::scene::materials::Material;
 use relt::scene::{Mesh, SceneDescription};
@@ -33,6 +33,14 @@ fn own_scene(name: &str) -> SceneDescription {
 
 fn load(path: &Path) -> SceneDescription {
     relt::load::scene(path, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The field of view and what it spans.
+fn field_of_view(scene: &SceneDescription) -> (f32, FovAxis) {
+    match scene.camera.projection {
+        Projection::Perspective { fov, fov_axis, principal_point: [0.0, 0.0], lens: None } => (fov, fov_axis),
+        other => panic!("{other:?} is no plain pinhole camera"),
+    }
 }
 
 /// Number of triangles of each shape.
@@ -61,7 +69,7 @@ fn assert_own_conventions(scene: &SceneDescription) {
     assert_eq!((scene.integrator.max_depth, scene.integrator.rr_depth), (Some(16), 5));
     assert_eq!((scene.film.width, scene.film.height, scene.film.filter), (256, 256, Filter::Box));
     assert_eq!((scene.camera.near_clip, scene.camera.far_clip), (1e-3, 100.0));
-    assert_eq!(scene.camera.fov_axis, FovAxis::Smaller);
+    assert_eq!(field_of_view(scene).1, FovAxis::Smaller);
     assert!(scene.lights.is_empty() && scene.warnings.is_empty(), "{:?} {:?}", scene.lights, scene.warnings);
     for shape in &scene.shapes {
         assert!(mesh(shape).normals.is_empty(), "{} has face_normals", shape.name);
@@ -84,7 +92,7 @@ fn the_cornell_box_loads_with_the_numbers_of_its_file() {
     ];
     assert_eq!(triangle_counts(&scene), expected);
     assert_eq!(emissions(&scene), [("light", Vec3::new(18.387, 13.9873, 6.75357))]);
-    assert_eq!(scene.camera.fov, 39.3077);
+    assert_eq!(field_of_view(&scene).0, 39.3077);
     // From (0, 0, 3.9) along −z with y up, x is to the left: that is a half turn about y.
     let expected = Affine3A::from_translation(Vec3::new(0.0, 0.0, 3.9)) * Affine3A::from_scale(Vec3::new(-1., 1., -1.));
     assert_same_map(scene.camera.to_world, expected, "camera");
@@ -121,7 +129,7 @@ fn the_lattice_loads_with_its_twenty_bars() {
     assert!(counts.contains(&("bars", 20 * 12)), "{counts:?}");
     assert_eq!(counts.iter().map(|(_, count)| count).sum::<usize>(), 306);
     assert_eq!(emissions(&scene), [("lamp", Vec3::new(80.0, 74.0, 62.0))]);
-    assert_eq!(scene.camera.fov, 75.0);
+    assert_eq!(field_of_view(&scene).0, 75.0);
 }
 
 #[test]
@@ -131,7 +139,7 @@ fn a_scene_of_others_loads() {
     let scene = load(&folder.join("bitterli-cornell-box/scene.xml"));
     assert_eq!(triangle_counts(&scene).iter().map(|(_, count)| count).sum::<usize>(), 6 * 2 + 2 * 12);
     assert_eq!(emissions(&scene), [("Light", Vec3::new(17.0, 12.0, 4.0))]);
-    assert_eq!(scene.camera.fov_axis, FovAxis::X);
+    assert_eq!(field_of_view(&scene).1, FovAxis::X);
     // The walls look away from the room, the lamp into it, as in Mitsuba.
     for (name, direction) in
         [("BackWall", Vec3::NEG_Z), ("RightWall", Vec3::X), ("LeftWall", Vec3::NEG_X), ("Light", Vec3::NEG_Y)]
@@ -147,9 +155,10 @@ fn a_bare_sensor_is_that_of_mitsuba() {
     let scene = scene_with("");
     let camera = scene.camera;
     // Mitsuba prints x_fov = 38.1848 for it: 50 mm on film of 36 × 24 mm, whose diagonal that of 4:3 matches.
-    let half_diagonal = (camera.fov / 2.0).to_radians().tan();
-    assert_eq!(camera.fov_axis, FovAxis::Diagonal);
-    assert!((2.0 * (0.8 * half_diagonal).atan().to_degrees() - 38.1848).abs() < 1e-4, "{}", camera.fov);
+    let (fov, axis) = field_of_view(&scene);
+    let half_diagonal = (fov / 2.0).to_radians().tan();
+    assert_eq!(axis, FovAxis::Diagonal);
+    assert!((2.0 * (0.8 * half_diagonal).atan().to_degrees() - 38.1848).abs() < 1e-4, "{fov}");
     assert_eq!((camera.near_clip, camera.far_clip), (1e-2, 1e4));
     assert_same_map(camera.to_world, Affine3A::IDENTITY, "camera");
     assert_eq!((scene.film.width, scene.film.height), (768, 576));
@@ -168,10 +177,8 @@ fn parameters_that_do_not_concern_relt_are_accepted() {
         <string name='component_format' value='float16'/><boolean name='banner' value='false'/>
         <rfilter type='tent'/></film></sensor><emitter type='constant'/></scene>";
     let scene = Folder::new(&[]).load(text, &[]).unwrap();
-    assert_eq!(
-        (scene.film.filter, scene.camera.fov, scene.camera.fov_axis),
-        (Filter::Tent { radius: 1.0 }, 30.0, FovAxis::X)
-    );
+    assert_eq!(scene.film.filter, Filter::Tent { radius: 1.0 });
+    assert_eq!(field_of_view(&scene), (30.0, FovAxis::X));
 }
 
 #[test]
@@ -439,6 +446,30 @@ fn spheres_and_disks_are_scaled_turned_and_moved() {
 }
 
 #[test]
+fn cylinders_are_scaled_turned_and_moved_and_may_be_stretched_along_their_axis() {
+    let cylinder = |text: &str| match shape(&[], text).geometry {
+        ShapeGeometry::Cylinder { start, length, radius, axes, flipped } => {
+            assert_near(axes.x_axis.cross(axes.y_axis), axes.z_axis, "axes");
+            (start, start + length * axes.z_axis, radius, flipped)
+        }
+        other => panic!("a cylinder: {other:?}"),
+    };
+    let (start, end, radius, flipped) = cylinder("<shape type='cylinder'/>");
+    assert_eq!((start, end, radius, flipped), (Vec3::ZERO, Vec3::Z, 1.0, false));
+    let text = "<shape type='cylinder'><point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='2' z='0'/>
+        <float name='radius' value='3'/><boolean name='flip_normals' value='true'/><transform name='to_world'>
+        <scale x='2' y='5' z='2'/><rotate z='1' angle='90'/><translate z='5'/></transform></shape>";
+    let (start, end, radius, flipped) = cylinder(text);
+    assert_near(start, Vec3::new(0.0, 2.0, 5.0), "start");
+    assert_near(end, Vec3::new(-10.0, 2.0, 5.0), "end");
+    assert!((radius - 6.0).abs() < 1e-5 && flipped);
+    // in a mirror the front stays outside and surface coordinates are mirrored, as in Mitsuba
+    let text = "<shape type='cylinder'><transform name='to_world'><scale x='-1'/></transform></shape>";
+    let ShapeGeometry::Cylinder { axes, flipped, .. } = shape(&[], text).geometry else { panic!("a cylinder") };
+    assert_eq!((axes.x_axis, axes.y_axis, axes.z_axis, flipped), (Vec3::NEG_X, Vec3::Y, Vec3::Z, false));
+}
+
+#[test]
 fn shading_normals_stay_perpendicular_under_uneven_scales() {
     // The plane with normal (0, 0.6, 0.8), scaled by 1, 2, 3.
     let normals = &mesh(&scaled("obj", "1, 2, 3", SMOOTH)).normals.clone();
@@ -446,7 +477,32 @@ fn shading_normals_stay_perpendicular_under_uneven_scales() {
     assert_near(normals[0], Vec3::new(0.0, 0.6 / 2.0, 0.8 / 3.0).normalize(), "normal");
     let flipped = scaled("obj", "1", &[SMOOTH, FLIP].concat());
     assert_near(mesh(&flipped).normals[0], Vec3::new(0.0, -0.6, -0.8), "flipped normal");
-    assert!(mesh(&scaled("obj", "1", FLAT)).normals.is_empty(), "none in the file, none made up");
+    assert!(mesh(&scaled("obj", "1", &[SMOOTH, FACE_NORMALS].concat())).normals.is_empty());
+}
+
+#[test]
+fn meshes_without_normals_get_smooth_ones_as_in_mitsuba() {
+    let obj: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n";
+    let ply: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 2\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1 2\n3 1 3 2\n";
+    // as Mitsuba 3.9.1 has them: weighted by angles, 45° and 60° at the fold
+    let fold = Vec3::new(-0.370_482_77, -0.370_482_77, 0.851_754_07);
+    let expected = [Vec3::Z, fold, fold, Vec3::new(-1.0, -1.0, 1.0).normalize()];
+    for (kind, content) in [("obj", obj), ("ply", ply)] {
+        let file = format!("folded.{kind}");
+        let read = |inner: &str| {
+            let text = format!("<shape type='{kind}'><string name='filename' value='{file}'/>{inner}</shape>");
+            mesh(&shape(&[(&file, content)], &text)).clone()
+        };
+        for (i, expected) in expected.into_iter().enumerate() {
+            assert_near(read("").normals[i], expected, &format!("{kind}, normal {i}"));
+            assert_near(read(FLIP).normals[i], -expected, &format!("{kind}, flipped normal {i}"));
+        }
+        // a mirror turns them, as it turns the corners
+        let mirrored = read("<transform name='to_world'><scale x='-1'/></transform>");
+        assert_near(mirrored.normals[1], Vec3::new(-fold.x, fold.y, fold.z) * -1.0, "mirrored");
+        assert!(read(FACE_NORMALS).normals.is_empty());
+    }
 }
 
 #[test]

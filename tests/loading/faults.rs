@@ -17,7 +17,11 @@ const FILES: &[(&str, &[u8])] = &[
     ("empty.obj", b""),
     ("points.obj", b"v 0 0 0\nv 1 0 0\n"),
     ("line.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
-    ("mixed.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 3 2 1\n"),
+    ("edge.obj", b"v 0 0 0\nv 1 0 0\nf 1 2\n"),
+    ("good.ply", PLY),
+    ("good.serialized", include_bytes!("../mitsuba/meshes/balls.serialized")),
+    ("no.serialized", b"no serialized mesh at all"),
+    ("short.serialized", b"\x1c\x04\x04\x00\x78\x9c"),
     ("no.ply", b"no ply at all\n"),
     ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n"),
     ("huge.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n1"),
@@ -34,6 +38,11 @@ const FILES: &[(&str, &[u8])] = &[
         b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\nfar\n",
     ),
     (
+        "letters.ply",
+        b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+        0 0 0\n0 far 0\n",
+    ),
+    (
         "range.ply",
         b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
         element face 2\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 3\n",
@@ -44,6 +53,10 @@ const FILES: &[(&str, &[u8])] = &[
         element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -2\n",
     ),
 ];
+
+/// A triangle.
+const PLY: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
 /// The error that a text gives.
 fn error(folder: &Folder, text: &str, defines: &[(&str, &str)]) -> LoadError {
@@ -68,7 +81,7 @@ fn faults(text: &str, defines: &[(&str, &str)]) -> Vec<String> {
 
 /// A text, and what the faults in it begin with, in order and no others.
 #[track_caller]
-fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
+pub fn assert_faults(text: &str, defines: &[(&str, &str)], expected: &[&str]) {
     let found = faults(text, defines);
     let is_same = found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| f.starts_with(e));
     let text: String = text.chars().take(2000).collect();
@@ -119,7 +132,7 @@ fn what_is_unknown_is_a_fault_that_lists_what_is_known() {
         ("<bsdf type='difuse'/>", "2:13: unknown bsdf \"difuse\" (did you mean \"diffuse\"?); known: "),
         (
             "<shape type='sphere '/>",
-            "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, disk, obj,",
+            "2:14: unknown shape \"sphere \" (did you mean \"sphere\"?); known: cube, cylinder, disk, instance, obj,",
         ),
         ("<integrator type='bdpt'/>", "2:19: unknown integrator \"bdpt\"; known: path"),
         (
@@ -301,7 +314,7 @@ fn lights_that_shine_nowhere_are_faults() {
 }
 
 #[test]
-fn facets_have_a_known_distribution_and_one_roughness() {
+fn facets_have_a_known_distribution_and_roughnesses_that_make_sense() {
     let of = |inner: &str, expected: &str| {
         let bsdf = format!("<bsdf type='roughconductor'>\n{inner}</bsdf>");
         assert_each(&[(&bsdf, expected)]);
@@ -310,13 +323,36 @@ fn facets_have_a_known_distribution_and_one_roughness() {
     of("<float name='alpha' value='-0.1'/>", "3:28: alpha is -0.1; a roughness is finite and not negative");
     of("<float name='alpha_u' value='0.1'/>", "3:30: alpha_u and alpha_v are given together");
     of(
-        "<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/>",
-        "3:65: alpha_u and alpha_v differ; accepted are surfaces of equal roughness both ways",
-    );
-    of(
         "<float name='alpha' value='0.1'/><float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.1'/>",
         "3:28: give either alpha or alpha_u and alpha_v, not both",
     );
+    assert_each(&[(
+        "<bsdf type='roughplastic'>\n<float name='alpha_u' value='0.1'/><float name='alpha_v' value='0.2'/></bsdf>",
+        "3:65: alpha_u and alpha_v differ; a roughplastic has one roughness",
+    )]);
+}
+
+#[test]
+fn parameters_of_principled_materials_have_ranges() {
+    let of = |inner: &str, expected: &str| {
+        let bsdf = format!("<bsdf type='principled'>\n{inner}</bsdf>");
+        assert_each(&[(&bsdf, expected)]);
+    };
+    of("<float name='sheen' value='1.5'/>", "3:28: sheen is 1.5; accepted are numbers from 0 to 1");
+    of("<float name='eta' value='0'/>", "3:26: eta is 0; a ratio of refractive indices is finite and greater than 0");
+    of(
+        "<float name='eta' value='1.5'/><float name='specular' value='0.5'/>",
+        "3:62: give either eta or specular, not both",
+    );
+    of(
+        "<float name='main_specular_sampling_rate' value='0'/>",
+        "3:50: main_specular_sampling_rate is 0; a rate of sampling is finite and greater than 0",
+    );
+    of(
+        "<float name='clearcoat_sampling_rate' value='-1'/>",
+        "3:46: clearcoat_sampling_rate is -1; a rate of sampling is finite and not negative",
+    );
+    of("<float name='diff_trans' value='1'/>", "3:14: unknown parameter \"diff_trans\" of bsdf \"principled\"");
 }
 
 #[test]
@@ -379,7 +415,10 @@ fn films_of_no_size_are_faults() {
         ),
         ("<float name='width' value='10'/>", "3:1: \"width\" is given as <float>; accepted: <integer>"),
         ("<string name='file_format' value='png'/>", "3:35: unknown file_format \"png\"; known: exr, openexr"),
-        ("<rfilter type='lanczos'/>", "3:16: unknown rfilter \"lanczos\"; known: box, gaussian, tent"),
+        (
+            "<rfilter type='sinc'/>",
+            "3:16: unknown rfilter \"sinc\"; known: box, catmullrom, gaussian, lanczos, mitchell, tent",
+        ),
         ("<rfilter type='tent'><float name='radius' value='0'/></rfilter>", "3:50: radius is 0 pixels"),
         ("<rfilter type='gaussian'><float name='stddev' value='5'/></rfilter>", "3:54: stddev is 5 pixels"),
     ] {
@@ -422,23 +461,72 @@ fn transforms_that_make_no_sense_are_faults() {
     let uneven = "<transform name='to_world'>\n<scale x='2'/></transform></shape>";
     assert_faults(&around(&format!("<shape type='sphere'>{uneven}")), &[], &["2:22: a sphere must stay one"]);
     assert_faults(&around(&format!("<shape type='disk'>{uneven}")), &[], &["2:20: a disk must stay a circle"]);
+    assert_faults(&around(&format!("<shape type='cylinder'>{uneven}")), &[], &["2:24: a cylinder must stay one"]);
+    let sheared = "<transform name='to_world'>\n<matrix value='1 0 0.5 0 1 0 0 0 1'/></transform></shape>";
+    assert_faults(&around(&format!("<shape type='cylinder'>{sheared}")), &[], &["2:24: a cylinder must stay one"]);
+}
+
+#[test]
+fn singular_transforms_of_all_shapes_are_faults() {
+    let mesh = |file: &str| format!("<string name='filename' value='{file}'/>");
+    let group = "<ref id='group'/>".to_owned();
+    for (kind, inner) in [
+        ("cube", String::new()),
+        ("cylinder", String::new()),
+        ("disk", String::new()),
+        ("instance", group),
+        ("obj", mesh("good.obj")),
+        ("ply", mesh("good.ply")),
+        ("rectangle", String::new()),
+        ("serialized", mesh("good.serialized")),
+        ("sphere", String::new()),
+    ] {
+        for scale in ["x='0'", "value='0'", "value='1e-30'", "x='1e30'"] {
+            let text = format!(
+                "<shape type='{kind}'>{inner}\n<transform name='to_world'><scale {scale}/></transform></shape>"
+            );
+            let group = "<shape type='shapegroup' id='group'><shape type='cube'/></shape>";
+            let found = faults(&around(&format!("{text}{group}")), &[]);
+            let expected = "3:1: the transform is singular: it flattens space or makes values infinite";
+            assert_eq!(found.iter().filter(|fault| *fault == expected).count(), 1, "{kind}, {scale}: {found:?}");
+            assert_eq!(found.len(), 1, "{kind}, {scale}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn cylinders_without_extent_are_faults() {
+    assert_each(&[
+        (
+            "<shape type='cylinder'>\n<point name='p1' value='0, 0, 0'/></shape>",
+            "3:25: p0 and p1 are the same point, or too far apart: the cylinder has no axis",
+        ),
+        (
+            "<shape type='cylinder'>\n<float name='radius' value='0'/></shape>",
+            "3:29: radius is 0 (0 in the world); it must be",
+        ),
+        ("<shape type='cylinder'>\n<float name='radius' value='-2'/></shape>", "3:29: radius is -2"),
+    ]);
 }
 
 #[test]
 fn meshes_that_cannot_be_used_are_faults() {
     for (file, expected) in [
         ("missing.obj", "cannot be read: "),
-        ("nan.obj", "line 3: vertex 2 is \"1 nan 0\"; it must be finite"),
-        ("infinite.obj", "line 3: vertex 3 is \"0 1 1e39\"; it must be finite"),
-        ("range.obj", "line 5: face vertex index out of bounds: \"f 1 2 4\""),
-        ("zero.obj", "line 4: "),
-        ("words.obj", "line 2: position parse error: \"v 1 0 here\""),
+        ("nan.obj", "line 3: the vertex must be finite: \"v 1 nan 0\""),
+        ("infinite.obj", "line 3: the vertex must be finite: \"v 0 1 1e39\""),
+        ("range.obj", "line 5: vertex 4 of 3: \"f 1 2 4\""),
+        ("zero.obj", "line 4: vertex 0: numbers begin at 1: \"f 0 1 2\""),
+        ("words.obj", "line 2: \"here\" is not a number: \"v 1 0 here\""),
         ("empty.obj", "the mesh is empty: "),
         ("points.obj", "the mesh is empty: "),
+        ("edge.obj", "line 3: the face has 2 corners; it must have 3 or more: \"f 1 2\""),
         ("line.obj", "none of its 1 triangles has an area"),
-        ("mixed.obj", "some of its faces have normals and some have none"),
         ("no.ply", "it is no readable PLY: "),
-        ("words.ply", "it is no readable PLY: Line 6: "),
+        ("words.ply", "its vertices have no x, y and z"),
+        ("letters.ply", "it is no readable PLY: vertex 2 of 2: line 9: \"far\" is no number of the type in the header"),
+        ("no.serialized", "it is no serialized mesh: it begins with 0x6f6e, not 0x041c"),
+        ("short.serialized", "it is no whole serialized mesh: "),
         ("short.ply", "it is no readable PLY: "),
         ("huge.ply", "it is no readable PLY: "),
         ("flat.ply", "its vertices have no x, y and z"),
@@ -446,10 +534,17 @@ fn meshes_that_cannot_be_used_are_faults() {
         ("range.ply", "triangle 2 refers to vertex 4 of 3"),
         ("negative.ply", "face 1 has no list vertex_indices of whole numbers that are not negative"),
     ] {
-        let kind = &file[file.len() - 3..];
+        let (_, kind) = file.split_once('.').unwrap();
         let text = format!("<shape type='{kind}'>\n<string name='filename' value='{file}'/></shape>");
         assert_faults(&around(&text), &[], &[&format!("3:32: {file}: {expected}")]);
     }
+    let index = |value: i32| {
+        format!(
+            "<shape type='serialized'><string name='filename' value='no.serialized'/>\n<integer name='shape_index' value='{value}'/></shape>"
+        )
+    };
+    let negative = ["2:56: no.serialized: ", "3:36: shape_index is -1; the first mesh of a file is 0"];
+    assert_faults(&around(&index(-1)), &[], &negative);
     let absent = "<shape type='obj'/>";
     assert_faults(&around(absent), &[], &["2:1: shape \"obj\" needs the parameter \"filename\""]);
     let far =

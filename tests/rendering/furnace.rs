@@ -38,7 +38,8 @@ fn check(name: &str, scene: &str, radiance: f64, precision: f64) {
     let expected = Expected::constant(24, 16, [radiance as f32; 3]);
     for (method, settings) in methods() {
         let name = format!("furnace-{name}-{method}");
-        Agreement { name: &name, tiles: [24, 16], precision }.check(&runs(&scene, &settings, 8), &expected);
+        Agreement { name: &name, tiles: [24, 16], precision, filter: scene.film.filter }
+            .check(&runs(&scene, &settings, 8), &expected);
     }
 }
 
@@ -57,6 +58,14 @@ fn closed_rooms_that_glow_are_as_bright_as_their_series() {
 #[test]
 fn closed_rooms_are_as_bright_with_roulette_from_the_start() {
     check("roulette", &closed("cube", 0.5, -1, 1), 2.0, 0.005);
+}
+
+/// Weights of either sign make a constant of a constant.
+#[test]
+fn closed_rooms_are_as_bright_through_a_filter_with_negative_lobes() {
+    let scene = closed("cube", 0.5, -1, 5).replace("<rfilter type='box'/>", "<rfilter type='lanczos'/>");
+    assert!(scene.contains("lanczos"));
+    check("lanczos", &scene, 2.0, 0.005);
 }
 
 /// Paths of up to n edges meet n emitting walls: Σ aⁱ over i < n, which is (1 − aⁿ)/(1 − a).

@@ -1,8 +1,9 @@
 //! Whole pictures, from scene file to image, against what is known of them.
 //!
 //! [`mapping`] batch against scalar; [`furnace`] scenes whose image is a formula; [`references`] scenes rendered by
-//! another program to little noise; [`mitsuba`] small scenes with one feature each, the same; [`bits`] what must not
-//! change a bit; [`darkness`] scenes without light, with hardly any and with too much.
+//! another program to little noise; [`mitsuba`] small scenes with one feature each, the same; [`scattering`] materials
+//! value by value, the same; [`bits`] what must not change a bit; [`darkness`] scenes without light, with hardly any and
+//! with too much.
 //!
 //! Statistical tests compare means over independent runs (samples of one chain correlate, runs do not), state their
 //! level, and leave the table and images of a failure under `target/test-evidence/NAME`.
@@ -13,4 +14,5 @@ mod furnace;
 mod mapping;
 mod mitsuba;
 mod references;
+mod scattering;
 mod support;

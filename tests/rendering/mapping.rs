@@ -124,6 +124,7 @@ fn batch_and_scalar_agree_where_a_scene_has_everything() {
     for name in [
         "everything",
         "mixtures",
+        "orthographic",
         "picture-lights",
         "relief",
         "roulette",
@@ -133,6 +134,7 @@ fn batch_and_scalar_agree_where_a_scene_has_everything() {
         "smooth-emitter-light",
         "sphere-light",
         "textures",
+        "thin-lens",
     ] {
         let scene = load(&repository("tests/mitsuba").join(name).with_extension("xml"), &[]);
         every_width::<FullProfile>(name, &scene, Kernel::Full);

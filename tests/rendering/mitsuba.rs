@@ -11,7 +11,8 @@ fn check(names: &[&str]) {
         let scene = load(&folder.join(name).with_extension("xml"), &[]);
         let expected = Expected::read(&folder.join(name).with_extension("exr"));
         let runs = runs(&scene, &settings(Method::Path, 1024.0, 0), 8);
-        Agreement { name: &format!("mitsuba-{name}"), tiles: [24, 16], precision: 0.01 }.check(&runs, &expected);
+        Agreement { name: &format!("mitsuba-{name}"), tiles: [24, 16], precision: 0.01, filter: scene.film.filter }
+            .check(&runs, &expected);
     }
 }
 
@@ -22,7 +23,12 @@ fn materials_are_what_mitsuba_makes_of_them() {
 
 #[test]
 fn rough_materials_are_what_mitsuba_makes_of_them() {
-    check(&["rough-metal", "rough-glass"]);
+    check(&["rough-metal", "rough-glass", "rough-plastics", "brushed-metal", "brushed-glass"]);
+}
+
+#[test]
+fn principled_materials_are_what_mitsuba_makes_of_them() {
+    check(&["principled", "principled-glass", "principled-varied"]);
 }
 
 #[test]
@@ -37,12 +43,17 @@ fn thin_sheets_are_what_mitsuba_makes_of_them() {
 
 #[test]
 fn lights_are_what_mitsuba_makes_of_them() {
-    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light"]);
+    check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light", "cylinder-light"]);
 }
 
 #[test]
 fn shapes_are_what_mitsuba_makes_of_them() {
-    check(&["smooth", "flipped"]);
+    check(&["smooth", "flipped", "cylinder", "serialized"]);
+}
+
+#[test]
+fn instances_are_what_mitsuba_makes_of_them() {
+    check(&["instances"]);
 }
 
 #[test]
@@ -56,8 +67,18 @@ fn the_camera_sees_what_mitsubas_sees() {
 }
 
 #[test]
+fn other_cameras_see_what_mitsubas_see() {
+    check(&["principal-point", "crop", "thin-lens", "orthographic"]);
+}
+
+#[test]
 fn filters_spread_as_mitsubas_do() {
     check(&["gaussian", "tent"]);
+}
+
+#[test]
+fn filters_with_negative_lobes_spread_as_mitsubas_do() {
+    check(&["mitchell", "catmullrom", "lanczos"]);
 }
 
 #[test]

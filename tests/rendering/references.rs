@@ -46,7 +46,8 @@ fn check_methods(
     for (method, settings) in methods {
         let name = format!("reference-{name}-{method}");
         let precision = if *method == "mlt" { 3.0 * precision } else { precision };
-        Agreement { name: &name, tiles, precision }.check(&runs(scene, settings, RUNS), &expected);
+        Agreement { name: &name, tiles, precision, filter: scene.film.filter }
+            .check(&runs(scene, settings, RUNS), &expected);
     }
 }
 

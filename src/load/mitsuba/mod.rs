@@ -23,26 +23,33 @@ mod values;
 
 use std::path::Path;
 
-use super::LoadError;
 use super::faults::{Faults, did_you_mean};
+use super::{LoadError, Watch};
 use crate::scene::SceneDescription;
 use crate::scene::lights::Light;
 use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
+use sensors::View;
 pub use shapes::parse_ply;
 use textures::Textures;
 
 /// Reads the text of the scene file at `path`.
-pub fn read(path: &Path, text: String, defines: &[(String, String)]) -> Result<SceneDescription, LoadError> {
+pub fn read(
+    path: &Path,
+    text: String,
+    defines: &[(String, String)],
+    watch: &Watch,
+) -> Result<SceneDescription, LoadError> {
     let faults = Faults::default();
     let folder = path.parent().unwrap_or(Path::new(""));
-    let description = document::read(&text, defines, &faults).and_then(|scene| describe(&scene, folder, &faults));
+    let description =
+        document::read(&text, defines, &faults).and_then(|scene| describe(&scene, folder, watch, &faults));
     faults.settle(path, text, description)
 }
 
 /// Reads the elements of the scene.
-fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDescription> {
+fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> Option<SceneDescription> {
     let ids = Ids::new(scene, faults);
     let textures = Textures::new(scene, &ids, folder, faults);
     let mut bsdfs = bsdfs::Library::new(&ids, &textures, faults);
@@ -58,7 +65,7 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     }
     let view = sensor.and_then(|element| sensors::read(element, faults));
     let shape_elements = p.nested(&["shape"]);
-    let shapes = shapes::read(&shape_elements, folder, &mut bsdfs, &textures, faults);
+    let shapes = shapes::read(&shape_elements, folder, &ids, &mut bsdfs, &textures, watch, faults);
     for element in p.nested(&["bsdf"]) {
         bsdfs.bsdf(element, element); // those that no shape uses have faults as well
     }
@@ -73,14 +80,17 @@ fn describe(scene: &Element, folder: &Path, faults: &Faults) -> Option<SceneDesc
     }
     p.finish();
 
-    let (camera, film) = view?;
-    let (shapes, warnings) = shapes?;
+    let View { camera, film, mut warnings } = view?;
+    let shapes = shapes?;
+    warnings.extend(shapes.warnings);
     Some(SceneDescription {
         integrator: integrator?,
         camera,
         film,
         appearances: bsdfs.appearances,
-        shapes,
+        shapes: shapes.world,
+        groups: shapes.groups,
+        instances: shapes.instances,
         lights,
         warnings,
     })

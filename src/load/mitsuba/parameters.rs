@@ -121,6 +121,11 @@ impl<'a> ElementParameters<'a> {
         default
     }
 
+    /// Whether there is a parameter of that name, faulty or not.
+    pub fn is_given(&self, name: &str) -> bool {
+        self.child(name).is_some()
+    }
+
     /// The string of that name, without which the element means nothing.
     pub fn required_string(&mut self, name: &str) -> Option<String> {
         let is_absent = !self.element.children.iter().any(|c| c.kind() != Kind::Reference && c.value("name") == name);
@@ -250,6 +255,10 @@ impl Parameters for ElementParameters<'_> {
             matrix2: Mat2::from_cols(matrix3.x_axis.truncate(), matrix3.y_axis.truncate()),
             translation: translation.truncate(),
         }
+    }
+
+    fn varies(&self, name: &str) -> bool {
+        self.textured.iter().any(|(slot, _)| self.varying[*slot].name == name)
     }
 
     fn image(&mut self, name: &str) -> Option<Arc<Image>> {

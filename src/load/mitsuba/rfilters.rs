@@ -7,8 +7,17 @@ use crate::film::Filter;
 use crate::load::faults::Faults;
 use crate::scene::parameters::Parameters;
 
-const FILTERS: Registry<fn(&mut ElementParameters) -> Filter> =
-    Registry { tag: "rfilter", plugins: &[("box", |_| Filter::Box), ("gaussian", gaussian), ("tent", tent)] };
+const FILTERS: Registry<fn(&mut ElementParameters) -> Filter> = Registry {
+    tag: "rfilter",
+    plugins: &[
+        ("box", |_| Filter::Box),
+        ("catmullrom", |_| Filter::Mitchell { b: 0.0, c: 0.5 }),
+        ("gaussian", gaussian),
+        ("lanczos", lanczos),
+        ("mitchell", mitchell),
+        ("tent", tent),
+    ],
+};
 
 /// What Mitsuba's films do without a filter.
 pub const DEFAULT: Filter = Filter::Gaussian { stddev: 0.5 };
@@ -33,6 +42,36 @@ fn gaussian(p: &mut ElementParameters) -> Filter {
 /// `radius` in pixels.
 fn tent(p: &mut ElementParameters) -> Filter {
     Filter::Tent { radius: length(p, "radius", 1.0, MAX_RADIUS) }
+}
+
+/// `B` and `C`, as the paper calls them.
+fn mitchell(p: &mut ElementParameters) -> Filter {
+    Filter::Mitchell { b: share(p, "B"), c: share(p, "C") }
+}
+
+/// `lobes`, the radius in pixels.
+fn lanczos(p: &mut ElementParameters) -> Filter {
+    const DEFAULT: u32 = 3;
+    let lobes = match p.integer("lobes") {
+        None => DEFAULT,
+        Some(given) if (1..=MAX_RADIUS as i64).contains(&given) => given as u32,
+        Some(given) => {
+            p.fault("lobes", format!("lobes is {given}; accepted: 1 to {MAX_RADIUS}"));
+            DEFAULT
+        }
+    };
+    Filter::Lanczos { lobes }
+}
+
+/// A parameter of the cubics, of which the paper considers those within [0, 1]; others ring or blur without bounds.
+fn share(p: &mut ElementParameters, name: &str) -> f32 {
+    const DEFAULT: f32 = 1.0 / 3.0;
+    let given = p.float(name).unwrap_or(DEFAULT);
+    if (0.0..=1.0).contains(&given) {
+        return given;
+    }
+    p.fault(name, format!("{name} is {given}; accepted: 0 to 1"));
+    DEFAULT
 }
 
 /// A length within (0, most].

@@ -7,6 +7,7 @@
 //! To add one: a new file and one line in the registry below (and in [`read`], where files name it).
 
 mod constant;
+mod cylinder;
 mod directional;
 mod disk;
 mod envmap;
@@ -16,6 +17,7 @@ mod sphere;
 mod spot;
 
 pub use constant::Constant;
+pub use cylinder::Cylinder;
 pub use directional::Directional;
 pub use disk::Disk;
 pub use envmap::Envmap;
@@ -62,8 +64,8 @@ trait Emit {
     fn radiance(&self, _uv: Vec2) -> Rgb {
         Rgb::ZERO
     }
-    /// Samples a direction to it from the surface point `p` with geometric normal `ng`; `None` where the chosen place
-    /// does not shine to `p`.
+    /// Samples a direction to it from the surface point `p` with geometric normal `ng`, whose length says how far to leave
+    /// the surface (see [`lift`](crate::math::lift)); `None` where the chosen place does not shine to `p`.
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample>;
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal `n`
     /// on it, with respect to solid angle at `origin`; for lights at infinity, in the direction `q` from anywhere.
@@ -125,7 +127,7 @@ macro_rules! registry {
 }
 
 // meshes are in every profile; the others only where a scene has any
-registry! { Constant, Directional, Disk, Envmap, Point, Sphere, Spot }
+registry! { Constant, Cylinder, Directional, Disk, Envmap, Point, Sphere, Spot }
 
 /// Names that [`read`] knows, as scene files use them. (`area` is a property of shapes.)
 pub const KNOWN: &[&str] = &["constant", "directional", "envmap", "point", "spot"];
@@ -179,6 +181,9 @@ impl Light {
                 Light::Sphere(Sphere { center, radius, axes, flipped, radiance })
             }
             &ShapeGeometry::Disk { center, radius, axes } => Light::Disk(Disk::new(center, radius, axes, radiance)),
+            &ShapeGeometry::Cylinder { start, length, radius, axes, flipped } => {
+                Light::Cylinder(Cylinder { start, length, radius, axes, flipped, radiance })
+            }
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Perfect reflection weighted by the conductor's Fresnel reflectance.
@@ -20,12 +20,15 @@ pub struct Conductor {
 pub(super) struct Metal {
     eta: Rgb,
     k: Rgb,
-    specular_reflectance: Rgb,
+    pub specular_reflectance: Rgb,
     /// Without Fresnel factor.
     perfect: bool,
 }
 
 impl Metal {
+    /// What of it varies.
+    pub const VARYING: VaryingParameter = VaryingParameter::reflectance("specular_reflectance");
+
     /// By channel, at cos θ ≥ 0.
     #[inline(always)]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
@@ -70,6 +73,13 @@ pub(super) fn gold() -> Metal {
 }
 
 impl Scatter for Conductor {
+    const VARYING: &'static [VaryingParameter] = &[Metal::VARYING];
+
+    #[inline]
+    fn put(&mut self, _specular_reflectance: usize, value: Rgb) {
+        self.metal.specular_reflectance = value;
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { delta_reflection: true, ..Lobes::NONE }
     }

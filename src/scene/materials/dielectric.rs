@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{
     Rgb,
     parameters::{NumberOrName, Parameters},
@@ -16,27 +16,68 @@ use crate::scene::{
 /// default 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
+    interface: Interface,
+}
+
+/// What light meets between two dielectrics, smooth or rough; parameters as of [`Dielectric`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interface {
     /// Index inside over index outside.
-    eta: f32,
-    specular_reflectance: Rgb,
-    specular_transmittance: Rgb,
+    pub eta: f32,
+    pub specular_reflectance: Rgb,
+    pub specular_transmittance: Rgb,
+}
+
+impl Interface {
+    /// One that absorbs nothing.
+    pub fn clear(eta: f32) -> Interface {
+        Interface { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE }
+    }
+
+    pub fn read(p: &mut dyn Parameters) -> Interface {
+        Interface {
+            eta: relative_index(p, "bk7"),
+            specular_reflectance: p.reflectance("specular_reflectance", 1.0),
+            specular_transmittance: p.reflectance("specular_transmittance", 1.0),
+        }
+    }
+
+    /// As numbered by [`put`](Interface::put).
+    pub const VARYING: &'static [VaryingParameter] = &[
+        VaryingParameter::reflectance("specular_reflectance"),
+        VaryingParameter::reflectance("specular_transmittance"),
+    ];
+
+    /// Gives a parameter another value.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        *(if i == 0 { &mut self.specular_reflectance } else { &mut self.specular_transmittance }) = value;
+    }
 }
 
 impl Scatter for Dielectric {
+    const VARYING: &'static [VaryingParameter] = Interface::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.interface.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
     }
 
     #[inline(always)]
     fn sample(&self, wo: Vec3, _u: [f32; 2], choice: f32) -> Option<ScatterSample> {
-        let eta = if wo.z >= 0.0 { self.eta } else { 1.0 / self.eta };
+        let Interface { eta, specular_reflectance, specular_transmittance } = self.interface;
+        let eta = if wo.z >= 0.0 { eta } else { 1.0 / eta };
         let (reflectance, cos_t) = fresnel::dielectric(wo.z.abs(), eta);
         if choice < reflectance {
             let wi = Vec3::new(-wo.x, -wo.y, wo.z);
-            return Some(ScatterSample { wi, weight: self.specular_reflectance, pdf: f32::INFINITY, eta: 1.0 });
+            return Some(ScatterSample { wi, weight: specular_reflectance, pdf: f32::INFINITY, eta: 1.0 });
         }
         let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -cos_t.copysign(wo.z));
-        let weight = self.specular_transmittance / (eta * eta);
+        let weight = specular_transmittance / (eta * eta);
         Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta })
     }
 
@@ -46,17 +87,11 @@ impl Scatter for Dielectric {
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
-        Dielectric {
-            eta: relative_index(p, "bk7"),
-            specular_reflectance: p.reflectance("specular_reflectance", 1.0),
-            specular_transmittance: p.reflectance("specular_transmittance", 1.0),
-        }
+        Dielectric { interface: Interface::read(p) }
     }
 
     fn examples() -> Vec<Self> {
-        [1.5, 1.0 / 1.33, 1.0001]
-            .map(|eta| Dielectric { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE })
-            .to_vec()
+        [1.5, 1.0 / 1.33, 1.0001].map(|eta| Dielectric { interface: Interface::clear(eta) }).to_vec()
     }
 }
 

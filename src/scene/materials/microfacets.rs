@@ -3,25 +3,30 @@
 use glam::Vec3;
 
 use crate::math::{sin_cos_turn, warp::INV_PI};
-use crate::scene::parameters::Parameters;
+use crate::scene::{Rgb, parameters::Parameters, textures::scalar};
 
-/// An isotropic distribution of microfacet normals m over the upper hemisphere, with separable masking by Smith.
+/// A distribution of microfacet normals m over the upper hemisphere, with separable masking by Smith. Two roughnesses
+/// along x and y are a surface of roughness 1 that was stretched by as much: with the slopes s = m.x/(m.z α_u) and
+/// t = m.y/(m.z α_v) in place of tan θ/α everything is as where both are alike.
 ///
 /// Parameters as of [`RoughConductor`](super::RoughConductor).
 /// Source: Walter et al. 2007, "Microfacet models for refraction through rough surfaces"; visible normals: Heitz &
-/// d'Eon 2014.
+/// d'Eon 2014; stretching: Heitz 2014, "Understanding the masking-shadowing function", section 5.3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Microfacets {
     pub shape: FacetShape,
-    pub alpha: f32,
+    /// Roughness along x.
+    pub alpha_u: f32,
+    /// Roughness along y.
+    pub alpha_v: f32,
 }
 
 /// Distribution of slopes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FacetShape {
-    /// Normal: D(m) = exp(−tan²θ/α²)/(π α² cos⁴θ).
+    /// Normal: D(m) = exp(−s² − t²)/(π α_u α_v cos⁴θ).
     Beckmann,
-    /// Student-like, with long tails: D(m) = 1/(π α² cos⁴θ (1 + tan²θ/α²)²) (Trowbridge & Reitz 1975).
+    /// Student-like, with long tails: D(m) = 1/(π α_u α_v cos⁴θ (1 + s² + t²)²) (Trowbridge & Reitz 1975).
     Ggx,
 }
 
@@ -47,21 +52,41 @@ impl Microfacets {
             }
             Some(value)
         };
-        let [alpha, u, v] = ["alpha", "alpha_u", "alpha_v"].map(&mut roughness);
-        match (u, v) {
-            (None, None) => {}
-            _ if alpha.is_some() => p.fault("alpha", "give either alpha or alpha_u and alpha_v, not both".into()),
-            (Some(u), Some(v)) if u == v => {}
-            (Some(_), Some(_)) => {
-                p.fault(
-                    "alpha_v",
-                    "alpha_u and alpha_v differ; accepted are surfaces of equal roughness both ways".into(),
-                );
-            }
-            (Some(_), None) => p.fault("alpha_u", "alpha_u and alpha_v are given together".into()),
-            (None, Some(_)) => p.fault("alpha_v", "alpha_u and alpha_v are given together".into()),
+        let [alpha, u, v] = Self::ROUGHNESSES.map(&mut roughness);
+        let given = [("alpha", alpha), ("alpha_u", u), ("alpha_v", v)].map(|(name, a)| a.is_some() || p.varies(name));
+        match given {
+            [_, false, false] | [false, true, true] => {}
+            [true, ..] => p.fault("alpha", "give either alpha or alpha_u and alpha_v, not both".into()),
+            [_, true, false] => p.fault("alpha_u", "alpha_u and alpha_v are given together".into()),
+            [_, false, true] => p.fault("alpha_v", "alpha_u and alpha_v are given together".into()),
         }
-        Microfacets { shape, alpha: alpha.or(u).unwrap_or(0.1).max(LEAST_ALPHA) }
+        let [alpha_u, alpha_v] = [u, v].map(|own| alpha.or(own).unwrap_or(0.1).max(LEAST_ALPHA));
+        Microfacets { shape, alpha_u, alpha_v }
+    }
+
+    /// The names of the roughness, both ways and either way, as numbered by [`put`](Microfacets::put).
+    pub const ROUGHNESSES: [&'static str; 3] = ["alpha", "alpha_u", "alpha_v"];
+
+    /// Gives a roughness the value of a texture.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        let alpha = scalar(value).max(LEAST_ALPHA);
+        if i != 2 {
+            self.alpha_u = alpha;
+        }
+        if i != 1 {
+            self.alpha_v = alpha;
+        }
+    }
+
+    /// The same roughness both ways.
+    pub fn isotropic(shape: FacetShape, alpha: f32) -> Microfacets {
+        Microfacets { shape, alpha_u: alpha, alpha_v: alpha }
+    }
+
+    /// Whether turning the surface about its normal changes it.
+    pub fn is_anisotropic(&self) -> bool {
+        self.alpha_u != self.alpha_v
     }
 
     /// D(m): area of facets with normal `m` by unit area of the surface and unit solid angle; ∫ D(m) cos θ dm = 1.
@@ -70,8 +95,10 @@ impl Microfacets {
         if m.z <= 0.0 {
             return 0.0;
         }
-        let (alpha2, cos2) = (self.alpha * self.alpha, m.z * m.z);
-        let across = (m.x * m.x + m.y * m.y) / alpha2;
+        let (alpha2, cos2) = (self.alpha_u * self.alpha_v, m.z * m.z);
+        // over a common denominator, as a division takes longer than the rest
+        let (x, y) = (self.alpha_v * m.x, self.alpha_u * m.y);
+        let across = (x * x + y * y) / (alpha2 * alpha2);
         match self.shape {
             // so steep that the density underflows, as do the powers of the cosine
             FacetShape::Beckmann if across > NO_FACETS * cos2 => 0.0,
@@ -87,8 +114,8 @@ impl Microfacets {
         if v.dot(m) * v.z * m.z <= 0.0 {
             return 0.0;
         }
-        let tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z);
-        let slope2 = self.alpha * self.alpha * tan2;
+        let (x, y) = (self.alpha_u * v.x, self.alpha_v * v.y);
+        let slope2 = (x * x + y * y) / (v.z * v.z);
         match self.shape {
             FacetShape::Ggx => 2.0 / (1.0 + (1.0 + slope2).sqrt()),
             FacetShape::Beckmann => {
@@ -97,7 +124,7 @@ impl Microfacets {
                     return 1.0;
                 }
                 // Λ = (exp(−a²)/(a √π) − erfc(a))/2
-                let lambda = 0.5 * (libm::expf(-a * a) * FRAC_1_SQRT_PI / a - libm::erfcf(a));
+                let lambda = 0.5 * (libm::expf(-a * a) * FRAC_1_SQRT_PI as f32 / a - libm::erfcf(a));
                 1.0 / (1.0 + lambda)
             }
         }
@@ -106,8 +133,7 @@ impl Microfacets {
     /// A normal of the facets that `v` (v.z > 0) sees, with [`visible_density`](Microfacets::visible_density).
     #[inline(always)]
     pub fn sample_visible(&self, v: Vec3, u: [f32; 2]) -> Vec3 {
-        // as a surface of roughness 1 seen from a direction stretched as much
-        let stretched = Vec3::new(self.alpha * v.x, self.alpha * v.y, v.z).normalize();
+        let stretched = self.stretched(v);
         let m = match self.shape {
             FacetShape::Ggx => visible_hemisphere_normal(stretched, u),
             FacetShape::Beckmann => {
@@ -115,7 +141,19 @@ impl Microfacets {
                 Vec3::new(-x, -y, 1.0)
             }
         };
-        Vec3::new(self.alpha * m.x, self.alpha * m.y, m.z.max(0.0)).normalize()
+        self.facet(m)
+    }
+
+    /// Where a surface of roughness 1 looks from as this one does from `v`.
+    #[inline(always)]
+    pub fn stretched(&self, v: Vec3) -> Vec3 {
+        Vec3::new(self.alpha_u * v.x, self.alpha_v * v.y, v.z).normalize()
+    }
+
+    /// The facet that the one with the normal along `m` of a surface of roughness 1 becomes.
+    #[inline(always)]
+    pub fn facet(&self, m: Vec3) -> Vec3 {
+        Vec3::new(self.alpha_u * m.x, self.alpha_v * m.y, m.z.max(0.0)).normalize()
     }
 
     /// Density of visible normals with respect to solid angle: G₁(v) D(m) |v · m|/|cos θ_v|.
@@ -126,7 +164,7 @@ impl Microfacets {
 }
 
 /// 1/√π.
-const FRAC_1_SQRT_PI: f32 = 0.564_189_6;
+const FRAC_1_SQRT_PI: f64 = 0.564_189_583_547_756_3;
 /// Squared slope over α² from which on Beckmann's density is as good as 0: e⁻⁸⁰.
 const NO_FACETS: f32 = 80.0;
 /// Beckmann's Λ(a) is below 10⁻⁹ from here on.
@@ -136,7 +174,7 @@ const NOTHING_IS_MASKED: f32 = 4.0;
 /// along `v` is reflected to, which is uniform there.
 /// Source: Dupuy & Benyoub 2023, "Sampling visible GGX normals with spherical caps".
 #[inline(always)]
-fn visible_hemisphere_normal(v: Vec3, u: [f32; 2]) -> Vec3 {
+pub(super) fn visible_hemisphere_normal(v: Vec3, u: [f32; 2]) -> Vec3 {
     let z = (1.0 - u[1]) * (1.0 + v.z) - v.z;
     let r = (1.0 - z * z).max(0.0).sqrt();
     let (s, c) = sin_cos_turn(u[0]);
@@ -164,7 +202,7 @@ fn slope_along(u: f32, tan: f64) -> f32 {
     /// Slopes beyond are less probable than 10⁻¹⁶.
     const STEEPEST: f64 = 6.0;
     const PRECISION: f64 = 1e-8;
-    let weight = tan * FRAC_1_SQRT_PI_64;
+    let weight = tan * FRAC_1_SQRT_PI;
     let below = |s: f64| libm::erfc(-s) + weight * libm::exp(-s * s);
     let end = if tan * STEEPEST > 1.0 { 1.0 / tan } else { STEEPEST };
     // never 0 or 1, whose slopes are infinite or of no density
@@ -179,7 +217,7 @@ fn slope_along(u: f32, tan: f64) -> f32 {
         } else {
             low = s
         }
-        let slope = 2.0 * FRAC_1_SQRT_PI_64 * libm::exp(-s * s) * (1.0 - s * tan);
+        let slope = 2.0 * FRAC_1_SQRT_PI * libm::exp(-s * s) * (1.0 - s * tan);
         let step = s - error / slope;
         let next = if step > low && step < high { step } else { 0.5 * (low + high) };
         if (next - s).abs() < PRECISION {
@@ -190,9 +228,6 @@ fn slope_along(u: f32, tan: f64) -> f32 {
     s as f32
 }
 
-/// 1/√π.
-const FRAC_1_SQRT_PI_64: f64 = 0.564_189_583_547_756_3;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,7 +235,9 @@ mod tests {
 
     fn all() -> Vec<Microfacets> {
         let shapes = [FacetShape::Beckmann, FacetShape::Ggx];
-        shapes.into_iter().flat_map(|shape| [0.05, 0.3, 1.0].map(|alpha| Microfacets { shape, alpha })).collect()
+        let roughnesses = [(0.05, 0.05), (0.3, 0.3), (1.0, 1.0), (0.05, 0.3), (0.6, 0.2), (0.1, 1.0)];
+        let both = |shape| roughnesses.map(|(alpha_u, alpha_v)| Microfacets { shape, alpha_u, alpha_v });
+        shapes.into_iter().flat_map(both).collect()
     }
 
     fn towards(cos: f32) -> Vec3 {
@@ -210,7 +247,7 @@ mod tests {
 
     /// ∫ f over the upper hemisphere by midpoints in (log tan θ, φ), which resolves peaks of any width.
     fn integral(f: impl Fn(Vec3) -> f64) -> f64 {
-        let (steps, turns) = (2000, 64);
+        let (steps, turns) = (1000, 128);
         let (low, high) = (1e-6f64.ln(), 1e4f64.ln());
         let mut sum = 0.0;
         for i in 0..steps {
@@ -284,7 +321,7 @@ mod tests {
     fn slopes_solve_their_equation_wherever_they_are() {
         for tan in [0.0, 1e-6, 0.3, 1.0, 5.0, 100.0, 1e5] {
             let end = if tan > 1.0 / 6.0 { 1.0 / tan } else { 6.0 };
-            let below = |s: f64| libm::erfc(-s) + tan * FRAC_1_SQRT_PI_64 * libm::exp(-s * s);
+            let below = |s: f64| libm::erfc(-s) + tan * FRAC_1_SQRT_PI * libm::exp(-s * s);
             let mut last = f32::NEG_INFINITY;
             for i in 0..=1000 {
                 let u = i as f32 / 1000.0;
@@ -300,7 +337,7 @@ mod tests {
     #[test]
     fn smooth_limits_hold() {
         for shape in [FacetShape::Beckmann, FacetShape::Ggx] {
-            let facets = Microfacets { shape, alpha: LEAST_ALPHA };
+            let facets = Microfacets::isotropic(shape, LEAST_ALPHA);
             for (i, cos) in [1.0, 0.5, 0.1].into_iter().enumerate() {
                 let v = towards(cos);
                 for j in 1..20 {

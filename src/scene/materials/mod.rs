@@ -6,6 +6,8 @@
 //! To add one: a new file and one line in the registry below. The tests at the end of this folder iterate the
 //! registry, so a new member arrives tested.
 
+mod burley;
+mod coat;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -13,9 +15,11 @@ mod fresnel;
 mod microfacets;
 mod null;
 mod plastic;
+mod principled;
 mod principledthin;
 mod roughconductor;
 mod roughdielectric;
+mod roughplastic;
 mod thindielectric;
 
 #[cfg(test)]
@@ -29,9 +33,11 @@ pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use null::Null;
 pub use plastic::Plastic;
+pub use principled::Principled;
 pub use principledthin::PrincipledThin;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
+pub use roughplastic::RoughPlastic;
 pub use thindielectric::ThinDielectric;
 
 use super::{Rgb, parameters::Parameters};
@@ -70,6 +76,8 @@ pub struct Lobes {
     pub smooth: bool,
     /// Another one, of what goes through.
     pub smooth_transmission: bool,
+    /// Another one, of what is under a coat.
+    pub smooth_base: bool,
     /// Perfect reflection.
     pub delta_reflection: bool,
     /// Perfect refraction.
@@ -83,6 +91,7 @@ impl Lobes {
     pub const NONE: Lobes = Lobes {
         smooth: false,
         smooth_transmission: false,
+        smooth_base: false,
         delta_reflection: false,
         delta_transmission: false,
         straight: false,
@@ -90,9 +99,7 @@ impl Lobes {
 
     /// Whether choosing among the lobes takes a primary dimension of its own.
     pub fn need_choice(self) -> bool {
-        let Lobes { smooth, smooth_transmission, delta_reflection, delta_transmission, straight } = self;
-        let lobes = [smooth, smooth_transmission, delta_reflection, delta_transmission, straight];
-        lobes.into_iter().map(u8::from).sum::<u8>() > 1
+        self.in_words().len() > 1
     }
 
     /// Those of either.
@@ -100,6 +107,7 @@ impl Lobes {
         Lobes {
             smooth: self.smooth || other.smooth,
             smooth_transmission: self.smooth_transmission || other.smooth_transmission,
+            smooth_base: self.smooth_base || other.smooth_base,
             delta_reflection: self.delta_reflection || other.delta_reflection,
             delta_transmission: self.delta_transmission || other.delta_transmission,
             straight: self.straight || other.straight,
@@ -116,6 +124,7 @@ impl Lobes {
         let named = [
             (self.smooth, "smooth lobe"),
             (self.smooth_transmission, "smooth transmission"),
+            (self.smooth_base, "smooth base"),
             (self.delta_reflection, "perfect reflection"),
             (self.delta_transmission, "perfect refraction"),
             (self.straight, "straight passage"),
@@ -136,6 +145,23 @@ pub struct VaryingParameter {
     pub name: &'static str,
     /// What values it takes.
     pub range: Range,
+}
+
+impl VaryingParameter {
+    /// A colour with channels within 0…1.
+    pub const fn reflectance(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Reflectance }
+    }
+
+    /// A number within 0…1.
+    pub const fn fraction(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Fraction }
+    }
+
+    /// A number that is not negative.
+    pub const fn roughness(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Roughness }
+    }
 }
 
 /// What values a parameter takes.
@@ -220,11 +246,6 @@ macro_rules! registry {
                 match self { $(Material::$material(m) => m.put(parameter, value)),+ }
             }
 
-            /// See [`Scatter::needs_tangents`].
-            pub fn needs_tangents(&self) -> bool {
-                match self { $(Material::$material(m) => m.needs_tangents()),+ }
-            }
-
             /// The name of its kind.
             pub fn name(&self) -> &'static str {
                 match self { $(Material::$material(_) => $name),+ }
@@ -233,6 +254,11 @@ macro_rules! registry {
             /// Its lobes.
             pub fn lobes(&self) -> Lobes {
                 match self { $(Material::$material(m) => m.lobes()),+ }
+            }
+
+            /// See [`Scatter::needs_tangents`].
+            pub fn needs_tangents(&self) -> bool {
+                match self { $(Material::$material(m) => m.needs_tangents()),+ }
             }
 
             /// See [`Scatter::sample`].
@@ -263,8 +289,10 @@ registry! {
     "diffuse" => Diffuse,
     "null" => Null,
     "plastic" => Plastic,
+    "principled" => Principled,
     "principledthin" => PrincipledThin,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
+    "roughplastic" => RoughPlastic,
     "thindielectric" => ThinDielectric,
 }

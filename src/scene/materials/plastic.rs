@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::dielectric::relative_index;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::math::warp::{INV_PI, cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::scene::{Rgb, parameters::Parameters};
 
@@ -19,41 +19,90 @@ use crate::scene::{Rgb, parameters::Parameters};
 /// off by 0.1 %.
 #[derive(Clone, Copy, Debug)]
 pub struct Plastic {
-    eta: f32,
-    specular_reflectance: Rgb,
+    layers: Layers,
+}
+
+/// What plastics are made of, smooth or rough; made so that other reflectances, as textures give them at every hit, cost
+/// a few divisions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layers {
+    /// Index of the coat over that of what is around.
+    pub eta: f32,
+    pub specular_reflectance: Rgb,
+    /// R, of the interface from inside for diffuse light.
+    inside: f32,
+    nonlinear: bool,
+    /// r.
+    diffuse_reflectance: Rgb,
     /// r/(1 − r R)/η², or r/(1 − R)/η².
-    base: Rgb,
-    /// Part of samples that go to the mirror where it reflects half of the light.
-    mirror_share: f32,
+    pub base: Rgb,
+    /// Part of samples that go to the interface where it reflects half of the light.
+    share: f32,
+}
+
+impl Layers {
+    /// Reads all parameters; `inside` makes R of η.
+    pub fn read(p: &mut dyn Parameters, inside: impl Fn(f32) -> f32) -> Layers {
+        let nonlinear = p.boolean("nonlinear").unwrap_or(false);
+        let (diffuse, specular) =
+            (p.reflectance("diffuse_reflectance", 0.5), p.reflectance("specular_reflectance", 1.0));
+        let eta = relative_index(p, "polypropylene");
+        Layers::new(eta, inside(eta), diffuse, specular, nonlinear)
+    }
+
+    pub fn new(eta: f32, inside: f32, diffuse: Rgb, specular_reflectance: Rgb, nonlinear: bool) -> Layers {
+        let kept = if nonlinear { diffuse * inside } else { Rgb::splat(inside) };
+        let (specular_part, diffuse_part) = (specular_reflectance.element_sum(), diffuse.element_sum());
+        let both = specular_part + diffuse_part;
+        Layers {
+            eta,
+            specular_reflectance,
+            inside,
+            nonlinear,
+            diffuse_reflectance: diffuse,
+            base: diffuse / ((1.0 - kept) * (eta * eta)),
+            share: if both > 0.0 { specular_part / both } else { 0.5 },
+        }
+    }
+
+    /// As numbered by [`put`](Layers::put).
+    pub const VARYING: &'static [VaryingParameter] =
+        &[VaryingParameter::reflectance("diffuse_reflectance"), VaryingParameter::reflectance("specular_reflectance")];
+
+    /// Gives a parameter another value.
+    #[inline]
+    pub fn put(&mut self, i: usize, value: Rgb) {
+        let (diffuse, specular) =
+            if i == 0 { (value, self.specular_reflectance) } else { (self.diffuse_reflectance, value) };
+        *self = Layers::new(self.eta, self.inside, diffuse, specular, self.nonlinear);
+    }
+
+    /// The probability of sampling the interface where it reflects that part of the light.
+    #[inline(always)]
+    pub fn share_of_interface(&self, reflectance: f32) -> f32 {
+        let (interface, base) = (reflectance * self.share, (1.0 - reflectance) * (1.0 - self.share));
+        if interface + base > 0.0 { interface / (interface + base) } else { 1.0 }
+    }
 }
 
 impl Plastic {
     fn new(eta: f32, diffuse: Rgb, specular_reflectance: Rgb, nonlinear: bool) -> Plastic {
         let inside = diffuse_reflectance(1.0 / eta);
-        let kept = if nonlinear { diffuse * inside } else { Rgb::splat(inside) };
-        let mean = |rgb: Rgb| rgb.element_sum() / 3.0;
-        let both = mean(diffuse) + mean(specular_reflectance);
-        Plastic {
-            eta,
-            specular_reflectance,
-            base: diffuse / (1.0 - kept) / (eta * eta),
-            mirror_share: if both > 0.0 { mean(specular_reflectance) / both } else { 0.5 },
-        }
+        Plastic { layers: Layers::new(eta, inside, diffuse, specular_reflectance, nonlinear) }
     }
 
     /// The interface's reflectance, and the probability of sampling it.
     #[inline(always)]
     fn mirror(&self, cos: f32) -> (f32, f32) {
-        let reflectance = fresnel::dielectric(cos, self.eta).0;
-        let (mirror, base) = (reflectance * self.mirror_share, (1.0 - reflectance) * (1.0 - self.mirror_share));
-        (reflectance, if mirror + base > 0.0 { mirror / (mirror + base) } else { 1.0 })
+        let reflectance = fresnel::dielectric(cos, self.layers.eta).0;
+        (reflectance, self.layers.share_of_interface(reflectance))
     }
 
     /// f · cos θᵢ of the base.
     #[inline(always)]
     fn of_base(&self, reflectance: f32, cos_i: f32) -> Rgb {
-        let leaves = 1.0 - fresnel::dielectric(cos_i, self.eta).0;
-        self.base * ((1.0 - reflectance) * leaves * cos_i * INV_PI)
+        let leaves = 1.0 - fresnel::dielectric(cos_i, self.layers.eta).0;
+        self.layers.base * ((1.0 - reflectance) * leaves * cos_i * INV_PI)
     }
 }
 
@@ -66,6 +115,13 @@ fn diffuse_reflectance(eta: f32) -> f32 {
 }
 
 impl Scatter for Plastic {
+    const VARYING: &'static [VaryingParameter] = Layers::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.layers.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { smooth: true, delta_reflection: true, ..Lobes::NONE }
     }
@@ -78,7 +134,7 @@ impl Scatter for Plastic {
         let (reflectance, share) = self.mirror(wo.z);
         if choice < share {
             let wi = Vec3::new(-wo.x, -wo.y, wo.z);
-            let weight = self.specular_reflectance * (reflectance / share);
+            let weight = self.layers.specular_reflectance * (reflectance / share);
             return Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta: 1.0 });
         }
         let wi = cosine_hemisphere(u);
@@ -96,10 +152,7 @@ impl Scatter for Plastic {
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
-        let nonlinear = p.boolean("nonlinear").unwrap_or(false);
-        let (diffuse, specular) =
-            (p.reflectance("diffuse_reflectance", 0.5), p.reflectance("specular_reflectance", 1.0));
-        Plastic::new(relative_index(p, "polypropylene"), diffuse, specular, nonlinear)
+        Plastic { layers: Layers::read(p, |eta| diffuse_reflectance(1.0 / eta)) }
     }
 
     fn examples() -> Vec<Self> {

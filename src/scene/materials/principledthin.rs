@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Range, Scatter, ScatterSample, VaryingParameter};
+use super::{Evaluation, Lobes, Range, Scatter, ScatterSample, VaryingParameter, burley};
 use crate::math::warp;
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// The diffuse half of Mitsuba's `principledthin`, alike from both sides. With t = `diff_trans`/2 and c = `base_color`,
 ///
-/// - to the side that light comes from: f = (1 − t) c/π ((1 − wₒ/2)(1 − wᵢ/2) + R (wₒ + wᵢ + wₒ wᵢ (R − 1))),
-///   w = (1 − cos θ)⁵ of either direction and R = 2 `roughness` cos² θ_d, θ_d half the angle between them;
+/// - to the side that light comes from: f = (1 − t) c/π times Burley's diffuse lobe, as of
+///   [`Principled`](super::Principled);
 /// - to the other side: f = t c/π.
 ///
 /// Parameters: `base_color`, 0…1, default 0.5; `diff_trans`, 0…2, default 0: 2 is a sheet that only transmits;
@@ -63,11 +63,8 @@ impl Scatter for PrincipledThin {
             return Evaluation { value: self.base_color * pdf, pdf };
         }
         let pdf = (1.0 - self.transmitted) * cosine;
-        let half_cos2 = 0.5 * (1.0 + wo.dot(wi)); // cos² of half the angle
-        let retro = 2.0 * self.roughness * half_cos2;
-        let (o, i) = (grazing(cos_o), grazing(cos_i));
-        let shape = (1.0 - 0.5 * o) * (1.0 - 0.5 * i) + retro * (o + i + o * i * (retro - 1.0));
-        Evaluation { value: self.base_color * (shape * pdf), pdf }
+        let cos_d = (0.5 * (1.0 + wo.dot(wi)).max(0.0)).sqrt();
+        Evaluation { value: self.base_color * (burley::base(self.roughness, 0.0, cos_o, cos_i, cos_d) * pdf), pdf }
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
@@ -89,11 +86,4 @@ impl Scatter for PrincipledThin {
             |roughness, transmitted| PrincipledThin { base_color: Rgb::new(0.8, 0.5, 0.0), roughness, transmitted };
         vec![thin(0.5, 0.0), thin(0.0, 0.3), thin(0.5, 1.0)]
     }
-}
-
-/// (1 − cos θ)⁵, from 0 at normal incidence to 1 at grazing.
-#[inline(always)]
-fn grazing(cos: f32) -> f32 {
-    let m = (1.0 - cos).clamp(0.0, 1.0);
-    (m * m) * (m * m) * m
 }

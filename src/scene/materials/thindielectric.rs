@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::dielectric::relative_index;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, fresnel};
+use super::dielectric::Interface;
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Reflects and lets through as two parallel smooth interfaces do together: with all reflections between them,
@@ -13,25 +13,30 @@ use crate::scene::{Rgb, parameters::Parameters};
 /// Source: Born & Wolf, Principles of Optics, section 7.6, without interference.
 #[derive(Clone, Copy, Debug)]
 pub struct ThinDielectric {
-    /// Index of the pane over that around it.
-    eta: f32,
-    specular_reflectance: Rgb,
-    specular_transmittance: Rgb,
+    /// Of the pane (inside) and what is around it.
+    interface: Interface,
 }
 
 impl Scatter for ThinDielectric {
+    const VARYING: &'static [VaryingParameter] = Interface::VARYING;
+
+    #[inline]
+    fn put(&mut self, i: usize, value: Rgb) {
+        self.interface.put(i, value);
+    }
+
     fn lobes(&self) -> Lobes {
         Lobes { delta_reflection: true, delta_transmission: true, ..Lobes::NONE }
     }
 
     #[inline(always)]
     fn sample(&self, wo: Vec3, _u: [f32; 2], choice: f32) -> Option<ScatterSample> {
-        let one = fresnel::dielectric(wo.z.abs(), self.eta).0;
+        let one = fresnel::dielectric(wo.z.abs(), self.interface.eta).0;
         let both = 2.0 * one / (1.0 + one);
         let (wi, weight) = if choice < both {
-            (Vec3::new(-wo.x, -wo.y, wo.z), self.specular_reflectance)
+            (Vec3::new(-wo.x, -wo.y, wo.z), self.interface.specular_reflectance)
         } else {
-            (-wo, self.specular_transmittance)
+            (-wo, self.interface.specular_transmittance)
         };
         Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta: 1.0 })
     }
@@ -42,16 +47,10 @@ impl Scatter for ThinDielectric {
     }
 
     fn read(p: &mut dyn Parameters) -> Self {
-        ThinDielectric {
-            eta: relative_index(p, "bk7"),
-            specular_reflectance: p.reflectance("specular_reflectance", 1.0),
-            specular_transmittance: p.reflectance("specular_transmittance", 1.0),
-        }
+        ThinDielectric { interface: Interface::read(p) }
     }
 
     fn examples() -> Vec<Self> {
-        [1.5, 1.0 / 1.33]
-            .map(|eta| ThinDielectric { eta, specular_reflectance: Rgb::ONE, specular_transmittance: Rgb::ONE })
-            .to_vec()
+        [1.5, 1.0 / 1.33].map(|eta| ThinDielectric { interface: Interface::clear(eta) }).to_vec()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Learnt, Sampler};
 use crate::{
-    film::{Heuristic, Image, Plane, Splats},
+    film::{Footprint, Heuristic, Image, Plane, Splats},
     tempering::{Combine, Histogram, Tally},
 };
 
@@ -85,7 +85,7 @@ impl<W: Default + Send> Planes<'_, W> {
     fn balance(&self) -> Image {
         let hot = self.sums(self.sampler.screen.layers.hot).expect("a layer of the balanced image");
         let tempered = self.sums(self.sampler.screen.layers.tempered);
-        let (mean, scale) = (self.hot_means(), self.tempered_scale());
+        let (mean, scale) = (self.hot_means(&hot), self.tempered_scale());
         self.image(|i| {
             let hot = mean.of(&hot[i]);
             [0, 1, 2].map(|ch| hot[ch] + tempered.as_ref().map_or(0.0, |sums| sums[i][ch] * scale))
@@ -96,14 +96,14 @@ impl<W: Default + Send> Planes<'_, W> {
     fn even(&self) -> Image {
         let sums = self.sums(self.sampler.screen.layers.even).expect("a layer of stratified points");
         let [stratified, _] = self.sampler.points;
-        let mean = PixelMeans::new(self.pixels(), [stratified, 0], self.sampler.screen.footprint.is_box());
+        let mean = PixelMeans::new(&sums, [stratified, 0], &self.sampler.screen.footprint);
         self.image(|i| mean.of(&sums[i]))
     }
 
     /// E_u.
     fn uniform(&self) -> Image {
         let sums = self.sums(self.sampler.screen.layers.uniform).expect("a layer of uniform points");
-        let mean = self.pixel_means();
+        let mean = PixelMeans::new(&sums, self.sampler.points, &self.sampler.screen.footprint);
         self.image(|i| mean.of(&sums[i]))
     }
 
@@ -139,8 +139,8 @@ impl<W: Default + Send> Planes<'_, W> {
             return layers;
         }
         layers.push(("target".into(), Plane::Rgb(self.target())));
-        let mean = self.hot_means();
         let hot = hot.unwrap_or_default();
+        let mean = self.hot_means(&hot);
         layers.push(("rung1".into(), Plane::Rgb(self.image(|i| mean.of(&hot[i])))));
         let scale = self.tempered_scale();
         for k in 1..self.sampler.round.ladder.rungs() {
@@ -152,14 +152,10 @@ impl<W: Default + Send> Planes<'_, W> {
     }
 
     /// Means over the points since chains started.
-    fn hot_means(&self) -> PixelMeans {
+    fn hot_means(&self, sums: &[[f64; 4]]) -> PixelMeans {
         let [stratified, offered] = self.sampler.points;
         let points = [stratified - self.sampler.bootstrap, offered];
-        PixelMeans::new(self.pixels(), points, self.sampler.screen.footprint.is_box())
-    }
-
-    fn pixel_means(&self) -> PixelMeans {
-        PixelMeans::new(self.pixels(), self.sampler.points, self.sampler.screen.footprint.is_box())
+        PixelMeans::new(sums, points, &self.sampler.screen.footprint)
     }
 }
 
@@ -170,21 +166,51 @@ impl<W: Default + Send> Planes<'_, W> {
 /// touching the points that are offered to chains, which must stay independent. A pixel without any counts as 0; the
 /// others are scaled up for that, by the inverse of the probability of getting some, so that the estimate stays unbiased
 /// at any number of points. With a filter wider than a pixel the divisor is the sum of filter weights: consistent, as in
-/// Mitsuba.
+/// Mitsuba. Where such a filter has negative lobes that sum may come out near 0 or below, and the mean as large as you
+/// please, of either sign; so there the divisor is never less than half of what it is on average over the film. From some
+/// ten points a pixel on that hardly ever happens, and the less, the more there are.
 struct PixelMeans {
     scale: f64,
+    least: f64,
 }
 
 impl PixelMeans {
-    /// `stratified` and `offered` are the numbers of points of either kind; with a box filter a point is in one pixel.
-    fn new(pixels: f64, [stratified, offered]: [u64; 2], box_filter: bool) -> PixelMeans {
+    /// For what was gathered on that film: Σ of colours and of weights by pixel. `stratified` and `offered` are the numbers
+    /// of points of either kind; with a box filter a point is in one pixel.
+    fn new(sums: &[[f64; 4]], [stratified, offered]: [u64; 2], footprint: &Footprint) -> PixelMeans {
+        let pixels = sums.len() as f64;
         // (1 − s/P)⁺ (1 − 1/P)^o, the share of pixels that get none
         let none = (1.0 - stratified as f64 / pixels).max(0.0) * libm::exp(offered as f64 * libm::log1p(-1.0 / pixels));
         let some = if pixels > 1.0 { 1.0 - none } else { 1.0 };
-        PixelMeans { scale: if box_filter && some > 0.0 { 1.0 / some } else { 1.0 } }
+        let average = sums.iter().map(|sum| sum[3]).sum::<f64>() / pixels;
+        PixelMeans {
+            scale: if footprint.is_box() && some > 0.0 { 1.0 / some } else { 1.0 },
+            least: if footprint.has_negative_lobes() { 0.5 * average } else { 0.0 },
+        }
     }
 
     fn of(&self, &[r, g, b, weight]: &[f64; 4]) -> [f64; 3] {
-        if weight > 0.0 { [r, g, b].map(|v| v * self.scale / weight) } else { [0.0; 3] }
+        let divisor = weight.max(self.least);
+        if divisor > 0.0 { [r, g, b].map(|v| v * self.scale / divisor) } else { [0.0; 3] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Filter;
+
+    #[test]
+    fn a_pixel_whose_weights_cancel_stays_within_its_bounds() {
+        // three pixels of ten samples of 1 each, whose weights sum to 10 on average
+        let sums = [[19.5, 19.5, 19.5, 19.5], [10.4, 10.4, 10.4, 10.4], [0.1, 0.1, 0.1, 0.1]];
+        let means = |filter| {
+            let means = PixelMeans::new(&sums, [30, 0], &Footprint::new(filter, 3, 1));
+            sums.map(|sum| means.of(&sum)[0])
+        };
+        assert_eq!(means(Filter::Gaussian { stddev: 0.5 }), [1.0; 3], "weights above 0 are trusted");
+        assert_eq!(means(Filter::Lanczos { lobes: 3 }), [1.0, 1.0, 0.1 / 5.0]);
+        let below = PixelMeans::new(&sums, [30, 0], &Footprint::new(Filter::Lanczos { lobes: 3 }, 3, 1));
+        assert_eq!(below.of(&[2.0, 1.0, 0.0, -0.5]), [0.4, 0.2, 0.0]);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use relt::film::{Image, Plane, exr_file, png_file};
+use relt::film::{Filter, Image, Plane, exr_file, png_file};
 
 use super::statistics::{f_test, mean, t_test, variance};
 
@@ -31,6 +31,8 @@ pub struct Agreement<'a> {
     /// The largest relative standard error of the mean brightness for which the test says anything; a noisier set of
     /// runs fails, as it would agree with everything.
     pub precision: f64,
+    /// What the runs were filtered with: only some filters make pixels negative.
+    pub filter: Filter,
 }
 
 impl Expected {
@@ -53,7 +55,8 @@ impl Agreement<'_> {
     /// improbable, and leaves evidence.
     pub fn check(&self, runs: &[Image], expected: &Expected) {
         let mut faults = Vec::new();
-        if runs.iter().any(|run| !run.pixels.as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0)) {
+        let least = if self.filter.has_negative_lobes() { f32::NEG_INFINITY } else { 0.0 };
+        if runs.iter().any(|run| !run.pixels.as_flattened().iter().all(|v| v.is_finite() && *v >= least)) {
             faults.push("some pixels are negative or not finite".to_owned());
         }
         let means: Vec<[f64; 3]> = runs.iter().map(Image::mean).collect();
@@ -92,7 +95,7 @@ impl Agreement<'_> {
             .map(|(v, e)| v / pixels_a_tile + rounding(*e))
             .collect();
         let floor = FLOOR * mean(exact.into_iter());
-        let weight = |tile: usize| 1.0 / (expected_tiles[tile] + floor);
+        let weight = |tile: usize| 1.0 / (expected_tiles[tile].max(0.0) + floor);
         let scaled = |values: &[f64]| -> Vec<f64> { values.iter().enumerate().map(|(i, v)| v * weight(i)).collect() };
         let scaled_variances: Vec<f64> = variances.iter().enumerate().map(|(i, v)| v * weight(i).powi(2)).collect();
         let scaled_runs: Vec<Vec<f64>> = tiles.iter().map(|run| scaled(run)).collect();

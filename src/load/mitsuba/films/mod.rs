@@ -9,17 +9,19 @@ use super::rfilters;
 use crate::load::faults::Faults;
 use crate::scene::description::FilmDescription;
 
-const FILMS: Registry<fn(&mut ElementParameters) -> FilmDescription> =
-    Registry { tag: "film", plugins: &[("hdrfilm", hdrfilm::read)] };
+/// Reads a film; the second argument collects what the person should know.
+type Reader = fn(&mut ElementParameters, &mut Vec<String>) -> FilmDescription;
+
+const FILMS: Registry<Reader> = Registry { tag: "film", plugins: &[("hdrfilm", hdrfilm::read)] };
 
 /// What Mitsuba's sensors do without a film.
-pub const DEFAULT: FilmDescription = FilmDescription { width: 768, height: 576, filter: rfilters::DEFAULT };
+pub const DEFAULT: FilmDescription = FilmDescription::new(768, 576, rfilters::DEFAULT);
 
-/// Reads the element.
-pub fn read(element: &Element, faults: &Faults) -> Option<FilmDescription> {
+/// Reads the element, and adds to `warnings`.
+pub fn read(element: &Element, faults: &Faults, warnings: &mut Vec<String>) -> Option<FilmDescription> {
     let read = FILMS.find(element, faults)?;
     let mut p = ElementParameters::new(element, faults);
-    let film = read(&mut p);
+    let film = read(&mut p, warnings);
     p.finish();
     Some(film)
 }

@@ -1,10 +1,12 @@
-//! `perspective`: a pinhole camera with `to_world`, `fov` and `fov_axis` or `focal_length`, `near_clip`, `far_clip`.
+//! `perspective`: a pinhole camera with `to_world`, `fov` and `fov_axis` or `focal_length`, `principal_point_offset_x`
+//! and `_y`, `near_clip`, `far_clip`. A `focus_distance` is accepted and means nothing, as in Mitsuba: everything is sharp.
 
 use glam::{Affine3A, Mat3A};
 
 use super::super::parameters::ElementParameters;
 use super::super::values;
-use crate::scene::description::{CameraDescription, FovAxis};
+use super::clip;
+use crate::scene::description::{CameraDescription, FovAxis, Projection};
 use crate::scene::parameters::Parameters;
 
 const AXES: &[(&str, FovAxis)] = &[
@@ -18,6 +20,9 @@ const AXES: &[(&str, FovAxis)] = &[
 /// Diagonal of the 36 × 24 mm picture of 35 mm film, to which focal lengths refer.
 const DIAGONAL_MM: f32 = 43.266_61;
 
+/// Offsets of the principal point beyond which single precision tells pixels apart no longer.
+const MAX_OFFSET: f32 = 100.0;
+
 /// Largest entry of MᵀM − 1 that is not a scale; covers matrices written with four digits.
 const SCALE_TOLERANCE: f32 = 1e-3;
 
@@ -25,11 +30,13 @@ const SCALE_TOLERANCE: f32 = 1e-3;
 pub fn read(p: &mut ElementParameters) -> CameraDescription {
     let (fov, fov_axis) = field_of_view(p);
     let (near_clip, far_clip) = clip(p);
-    CameraDescription { to_world: rigid_to_world(p), fov, fov_axis, near_clip, far_clip }
+    p.float("focus_distance");
+    let projection = Projection::Perspective { fov, fov_axis, principal_point: principal_point(p), lens: None };
+    CameraDescription { to_world: rigid_to_world(p), projection, near_clip, far_clip }
 }
 
 /// `fov` in degrees along `fov_axis`, or else the diagonal one of `focal_length`, 50 mm by default.
-fn field_of_view(p: &mut ElementParameters) -> (f32, FovAxis) {
+pub(super) fn field_of_view(p: &mut ElementParameters) -> (f32, FovAxis) {
     let fov = p.float("fov");
     let focal_length = p.string("focal_length");
     let axis = p.choice("fov_axis", AXES, FovAxis::X);
@@ -52,21 +59,20 @@ fn of_focal_length(p: &mut ElementParameters, text: &str) -> f32 {
     90.0
 }
 
-/// `near_clip` and `far_clip`.
-fn clip(p: &mut ElementParameters) -> (f32, f32) {
-    let near = p.float("near_clip").unwrap_or(1e-2);
-    let far = p.float("far_clip").unwrap_or(1e4);
-    if near <= 0.0 {
-        p.fault("near_clip", format!("near_clip is {near}; it must be above 0"));
-    }
-    if near >= far {
-        p.fault("near_clip", format!("near_clip is {near} and far_clip {far}; near_clip must be the smaller"));
-    }
-    (near, far)
+/// `principal_point_offset_x` and `_y`, fractions of the picture's width and height.
+fn principal_point(p: &mut ElementParameters) -> [f32; 2] {
+    ["principal_point_offset_x", "principal_point_offset_y"].map(|name| {
+        let given = p.float(name).unwrap_or(0.0);
+        if given.abs() <= MAX_OFFSET {
+            return given;
+        }
+        p.fault(name, format!("{name} is {given} times the picture; accepted: -{MAX_OFFSET} to {MAX_OFFSET}"));
+        0.0
+    })
 }
 
 /// `to_world`, which may turn, move and mirror but not scale.
-fn rigid_to_world(p: &mut ElementParameters) -> Affine3A {
+pub(super) fn rigid_to_world(p: &mut ElementParameters) -> Affine3A {
     let to_world = p.to_world();
     let m = to_world.matrix3;
     let error = m.transpose() * m + Mat3A::IDENTITY * -1.0;

@@ -23,8 +23,8 @@ const FACES: [(Vec3, Vec3); 6] = [
 pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let face_normals = p.boolean("face_normals").unwrap_or(false);
-    let placement = Placement { to_world: p.to_world(), flip_normals };
-    Some(Box::new(move || {
+    let placement = Placement { to_world: p.to_world(), flip_normals, smooth: false };
+    Some(Build::new(move || {
         let mut raw = raw();
         if face_normals {
             raw.normals.clear(); // with them the front would be outside even if mirrored

@@ -30,6 +30,5 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
     let normal = if is_mirrored != flip_normals { -upright } else { upright };
     let x = x / radius;
     let axes = Mat3::from_cols(x, (y - x * x.dot(y)).normalize(), normal);
-    let geometry = ShapeGeometry::Disk { center: to_world.translation.into(), radius, axes };
-    Some(Box::new(move || Ok(geometry.into())))
+    Some(Build::ready(ShapeGeometry::Disk { center: to_world.translation.into(), radius, axes }))
 }

@@ -4,6 +4,7 @@ use std::ops::AddAssign;
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::Built;
 use crate::scene::Mesh;
@@ -29,6 +30,8 @@ pub struct Placement {
     pub to_world: Affine3A,
     /// The other side is the front.
     pub flip_normals: bool,
+    /// A mesh without normals gets smooth ones.
+    pub smooth: bool,
 }
 
 /// How much of the meshes could not be used as it was.
@@ -63,56 +66,103 @@ impl Repairs {
 }
 
 impl RawMesh {
-    /// The mesh in the world with smooth normals where it has any.
+    /// The mesh in the world, with the normals that it has, or with smooth ones where it shall have some.
     ///
     /// The front is where Mitsuba's shading frame points: along the vertex normals where there are any, else where
     /// corners run counter-clockwise *after* the transform. So a transform that mirrors turns a mesh without normals
     /// inside out and one with normals not.
-    pub fn place(self, placement: Placement) -> Result<(Mesh, Repairs), String> {
+    ///
+    /// All is done in place: a mesh may fill half of the memory.
+    pub fn place(mut self, placement: Placement) -> Result<(Mesh, Repairs), String> {
         self.check()?;
-        let to_world = placement.to_world;
-        let positions: Vec<_> = self.positions.iter().map(|p| to_world.transform_point3(*p)).collect();
-        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+        self.transform(placement.to_world)?;
+        let dropped = self.drop_triangles_without_area()?;
+        if placement.smooth && self.normals.is_empty() {
+            self.make_smooth_normals();
+        }
+        self.turn_fronts(placement.flip_normals);
+        let repairs = Repairs { dropped, replaced_normals: self.replace_normals_without_length() };
+        let mut mesh = Mesh::new(self.positions, self.triangles);
+        mesh.normals = self.normals;
+        mesh.uvs = self.uvs;
+        Ok((mesh, repairs))
+    }
+
+    /// Positions to the world; normals too, to unit length, 0 where they have none.
+    fn transform(&mut self, to_world: Affine3A) -> Result<(), String> {
+        if to_world != Affine3A::IDENTITY {
+            self.positions.par_iter_mut().for_each(|p| *p = to_world.transform_point3(*p));
+        }
+        if let Some(i) = self.positions.par_iter().position_first(|p| !p.is_finite()) {
             return Err(format!("vertex {} becomes infinite by to_world", i + 1));
         }
         let normal_to_world = to_world.matrix3.inverse().transpose();
-        let mut normals: Vec<_> =
-            self.normals.iter().map(|n| (normal_to_world * *n).try_normalize().unwrap_or(Vec3::ZERO)).collect();
+        let in_world = |n: Vec3| (normal_to_world * n).try_normalize().unwrap_or(Vec3::ZERO);
+        self.normals.par_iter_mut().for_each(|n| *n = in_world(*n));
+        Ok(())
+    }
 
-        let mut triangles = Vec::with_capacity(self.triangles.len());
-        let mut face_normals = vec![Vec3::ZERO; normals.len()];
-        for [a, b, c] in &self.triangles {
-            let corners = [*a, *b, *c].map(|i| i as usize);
-            let Some(face_normal) = face_normal(corners.map(|i| positions[i])) else { continue };
-            let is_against = if normals.is_empty() {
-                placement.flip_normals
-            } else {
-                let towards = corners.map(|i| normals[i]).iter().sum::<Vec3>().dot(face_normal);
-                (towards < 0.0) != placement.flip_normals
+    /// Leaves those triangles out that [`face_normal`] cannot be told of, and says how many.
+    fn drop_triangles_without_area(&mut self) -> Result<usize, String> {
+        let (count, positions) = (self.triangles.len(), &self.positions);
+        self.triangles.retain(|triangle| face_normal(triangle.map(|i| positions[i as usize])).is_some());
+        if self.triangles.is_empty() {
+            return Err(format!("none of its {count} triangles has an area"));
+        }
+        Ok(count - self.triangles.len())
+    }
+
+    /// Gives each vertex the mean of its triangles' normals, weighted by the angles that they have there, as Mitsuba does.
+    /// Source: Thürmer & Wüthrich 1998, "Computing vertex normals from polygonal facets".
+    fn make_smooth_normals(&mut self) {
+        let RawMesh { positions, normals, triangles, .. } = self;
+        normals.resize(positions.len(), Vec3::ZERO);
+        for triangle in triangles {
+            let corners = triangle.map(|i| positions[i as usize]);
+            let Some(face) = face_normal(corners) else { continue };
+            for (i, vertex) in triangle.iter().enumerate() {
+                let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
+                let angle = libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last));
+                normals[*vertex as usize] += face * angle;
+            }
+        }
+        normals.par_iter_mut().for_each(|n| *n = n.normalize_or_zero());
+    }
+
+    /// Makes corners run counter-clockwise, and normals point, where the front is.
+    fn turn_fronts(&mut self, flip: bool) {
+        let (positions, normals) = (&self.positions, &self.normals);
+        self.triangles.par_iter_mut().for_each(|triangle| {
+            let runs_with_normals = normals.is_empty() || {
+                let [towards, face] = [normals, positions].map(|v| triangle.map(|i| v[i as usize]));
+                let towards = towards.into_iter().sum::<Vec3>();
+                face_normal(face).is_none_or(|normal| towards.dot(normal) >= 0.0)
             };
-            for i in corners {
-                if let Some(kept) = face_normals.get_mut(i) {
-                    *kept = face_normal;
-                }
+            if runs_with_normals == flip {
+                triangle.swap(1, 2);
             }
-            triangles.push(if is_against { [*a, *c, *b] } else { [*a, *b, *c] });
+        });
+        if flip {
+            self.normals.par_iter_mut().for_each(|n| *n = -*n);
         }
-        if triangles.is_empty() {
-            return Err(format!("none of its {} triangles has an area", self.triangles.len()));
-        }
+    }
 
-        let mut repairs = Repairs { dropped: self.triangles.len() - triangles.len(), replaced_normals: 0 };
-        for (normal, face_normal) in normals.iter_mut().zip(face_normals) {
-            if *normal == Vec3::ZERO {
-                repairs.replaced_normals += usize::from(face_normal != Vec3::ZERO);
-                *normal = if face_normal == Vec3::ZERO { Vec3::Z } else { face_normal };
-            }
-            *normal *= if placement.flip_normals { -1.0 } else { 1.0 };
+    /// Gives vertices whose normal is 0 that of their last triangle, and says to how many.
+    fn replace_normals_without_length(&mut self) -> usize {
+        let zeros: Vec<u32> = (0..).zip(&self.normals).filter(|(_, n)| **n == Vec3::ZERO).map(|(i, _)| i).collect();
+        if zeros.is_empty() {
+            return 0;
         }
-        let mut mesh = Mesh::new(positions, triangles);
-        mesh.normals = normals;
-        mesh.uvs = self.uvs;
-        Ok((mesh, repairs))
+        for triangle in &self.triangles {
+            let Some(normal) = face_normal(triangle.map(|i| self.positions[i as usize])) else { continue };
+            for i in triangle.iter().filter(|i| zeros.binary_search(i).is_ok()) {
+                self.normals[*i as usize] = normal;
+            }
+        }
+        let (used, unused): (Vec<u32>, Vec<u32>) =
+            zeros.into_iter().partition(|i| self.normals[*i as usize] != Vec3::ZERO);
+        unused.into_iter().for_each(|i| self.normals[i as usize] = Vec3::Z); // no triangle sees it
+        used.len()
     }
 
     /// Finite values, indices in range, something there at all.
@@ -121,21 +171,20 @@ impl RawMesh {
         if self.triangles.is_empty() {
             return Err(format!("the mesh is empty: {count} vertices and no triangle"));
         }
-        for (i, p) in self.positions.iter().enumerate() {
-            if !p.is_finite() {
-                return Err(format!("vertex {} is ({}, {}, {}); it must be finite", i + 1, p.x, p.y, p.z));
-            }
+        if let Some(i) = self.positions.par_iter().position_first(|p| !p.is_finite()) {
+            let p = self.positions[i];
+            return Err(format!("vertex {} is ({}, {}, {}); it must be finite", i + 1, p.x, p.y, p.z));
         }
-        if let Some(i) = self.normals.iter().position(|n| !n.is_finite()) {
+        if let Some(i) = self.normals.par_iter().position_first(|n| !n.is_finite()) {
             return Err(format!("the normal of vertex {} is not finite", i + 1));
         }
-        if let Some(i) = self.uvs.iter().position(|uv| !uv.is_finite()) {
+        if let Some(i) = self.uvs.par_iter().position_first(|uv| !uv.is_finite()) {
             return Err(format!("the texture coordinates of vertex {} are not finite", i + 1));
         }
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            if let Some(index) = triangle.iter().find(|i| **i as usize >= count) {
-                return Err(format!("triangle {} refers to vertex {} of {count}", t + 1, u64::from(*index) + 1));
-            }
+        let beyond = |triangle: &[u32; 3]| triangle.iter().copied().find(|i| *i as usize >= count);
+        if let Some(t) = self.triangles.par_iter().position_first(|triangle| beyond(triangle).is_some()) {
+            let index = beyond(&self.triangles[t]).map_or(0, u64::from);
+            return Err(format!("triangle {} refers to vertex {} of {count}", t + 1, index + 1));
         }
         debug_assert!(self.normals.is_empty() || self.normals.len() == count);
         debug_assert!(self.uvs.is_empty() || self.uvs.len() == count);

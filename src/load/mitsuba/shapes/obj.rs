@@ -1,8 +1,14 @@
 //! `obj`: a Wavefront OBJ mesh; `filename`, `to_world`, `flip_normals`, `face_normals`, `flip_tex_coords`.
 //!
-//! Polygons become fans of triangles; materials, points and lines in the file are ignored. Without normals in the
-//! file the faces are flat.
+//! All groups and objects of the file are one mesh; materials, points, lines and curves in it are ignored. Polygons become
+//! fans of triangles from their first corner, as in Mitsuba. A face refers to vertices before it, by their number from 1 or
+//! backwards from −1. Without any normals in the file smooth ones are computed, as in Mitsuba, unless `face_normals`. Among
+//! faces with normals one without is flat, and among corners with texture coordinates one without has (0, 0); of that
+//! Mitsuba makes nothing.
 
+mod corners;
+
+use std::io::BufRead;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -10,99 +16,152 @@ use glam::{Vec2, Vec3};
 use super::super::parameters::ElementParameters;
 use super::mesh::RawMesh;
 use super::{Build, mesh_file};
+use corners::{Corner, Corners};
 
 /// Reads the element; the file is read by what it returns.
 pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
-    mesh_file(p, folder, true, parse)
+    mesh_file(p, folder, Some(true), |source| parse(source))
 }
 
 /// The text of a file as one mesh.
-fn parse(mut bytes: &[u8]) -> Result<RawMesh, String> {
-    let whole = bytes;
-    report_non_finite(whole)?;
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
-    let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
-    let (models, _) = tobj::load_obj_buf(&mut bytes, &options, no_materials).map_err(|error| explain(error, whole))?;
-    let mut raw = RawMesh::default();
-    let has_normals = models.iter().any(|m| !m.mesh.normals.is_empty());
-    let has_uvs = models.iter().any(|m| !m.mesh.texcoords.is_empty());
-    for model in models {
-        append(&mut raw, &model.mesh, has_normals, has_uvs)?;
-    }
-    Ok(raw)
-}
-
-/// Adds one group of the file.
-fn append(raw: &mut RawMesh, group: &tobj::Mesh, has_normals: bool, has_uvs: bool) -> Result<(), String> {
-    let count = group.positions.len() / 3;
-    let first = u32::try_from(raw.positions.len()).map_err(|_| "it has more than 2³² vertices".to_string())?;
-    if has_normals && group.normals.len() != 3 * count {
-        return Err("some of its faces have normals and some have none; give all of them or set face_normals".into());
-    }
-    raw.positions.extend(group.positions.chunks_exact(3).map(Vec3::from_slice));
-    raw.normals.extend(group.normals.chunks_exact(3).map(Vec3::from_slice));
-    if has_uvs && group.texcoords.len() == 2 * count {
-        raw.uvs.extend(group.texcoords.chunks_exact(2).map(Vec2::from_slice));
-    } else if has_uvs {
-        return Err("some of its faces have texture coordinates and some have none; give all or none".into());
-    }
-    raw.triangles.extend(group.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| first + i)));
-    Ok(())
-}
-
-/// Numbers of vertices that are not finite, found before vertices are renumbered; the line is worth a pass.
-fn report_non_finite(bytes: &[u8]) -> Result<(), String> {
-    let mut vertex = 0;
-    for (i, line) in lines(bytes).enumerate() {
-        let Some(rest) = line.strip_prefix("v ") else { continue };
-        vertex += 1;
-        let is_finite = |word: &str| word.parse::<f32>().map_or(true, f32::is_finite);
-        if !rest.split_ascii_whitespace().take(3).all(is_finite) {
-            let rest = rest.trim();
-            return Err(format!("line {}: vertex {vertex} is \"{rest}\"; it must be finite", i + 1));
+fn parse(source: &mut impl BufRead) -> Result<RawMesh, String> {
+    let mut file = Content::default();
+    let mut line = Vec::new();
+    let mut number = 0;
+    loop {
+        line.clear();
+        match read_line(source, &mut line) {
+            Ok(0) => break,
+            Ok(lines) => {
+                file.line(&line).map_err(|message| format!("line {}: {message}: {:?}", number + 1, shown(&line)))?;
+                number += lines;
+            }
+            Err(error) => return Err(error.to_string()),
         }
     }
-    Ok(())
+    Ok(file.corners.finish(file.positions, file.normals, file.uvs, file.triangles))
 }
 
-/// tobj's error with the line that caused it, where that can be told.
-fn explain(error: tobj::LoadError, bytes: &[u8]) -> String {
-    let is_bad_number = |line: &str, keyword: &str, least: usize| {
-        line.strip_prefix(keyword).is_some_and(|rest| {
-            let words: Vec<_> = rest.split_ascii_whitespace().collect();
-            words.len() < least || words.iter().any(|word| word.parse::<f32>().is_err())
-        })
-    };
-    let count = |keyword: &str| lines(bytes).filter(|line| line.starts_with(keyword)).count() as i64;
-    let is_bad_index = |line: &str, part: usize, count: i64| {
-        let indices = line.strip_prefix("f ").unwrap_or_default().split_ascii_whitespace();
-        let mut indices = indices.filter_map(|word| word.split('/').nth(part)?.parse::<i64>().ok());
-        indices.any(|index| index == 0 || index.abs() > count)
-    };
-    let culprit: Box<dyn Fn(&str) -> bool> = match error {
-        tobj::LoadError::PositionParseError => Box::new(|line| is_bad_number(line, "v ", 3)),
-        tobj::LoadError::NormalParseError => Box::new(|line| is_bad_number(line, "vn ", 3)),
-        tobj::LoadError::TexcoordParseError => Box::new(|line| is_bad_number(line, "vt ", 2)),
-        tobj::LoadError::FaceParseError => Box::new(|line| line.starts_with("f ") && !is_face(line)),
-        tobj::LoadError::FaceVertexOutOfBounds => Box::new(move |line| is_bad_index(line, 0, count("v "))),
-        tobj::LoadError::FaceTexCoordOutOfBounds => Box::new(move |line| is_bad_index(line, 1, count("vt "))),
-        tobj::LoadError::FaceNormalOutOfBounds => Box::new(move |line| is_bad_index(line, 2, count("vn "))),
-        _ => Box::new(|_| false),
-    };
-    match lines(bytes).enumerate().find(|(_, line)| culprit(line)) {
-        Some((i, line)) => format!("line {}: {error}: \"{}\"", i + 1, line.trim()),
-        None => format!("it is no Wavefront OBJ: {error}"),
+/// Appends the next line, with those that a backslash at its end joins to it; how many these are, 0 at the end.
+fn read_line(source: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<usize> {
+    let mut lines = 0;
+    while source.read_until(b'\n', line)? > 0 {
+        lines += 1;
+        let text = line.trim_ascii_end().len();
+        if !line[..text].ends_with(b"\\") {
+            break;
+        }
+        line.truncate(text - 1);
+        line.push(b' ');
+    }
+    Ok(lines)
+}
+
+/// A line in a message.
+fn shown(line: &[u8]) -> String {
+    String::from_utf8_lossy(line.trim_ascii()).chars().filter(|c| !c.is_control()).take(80).collect()
+}
+
+/// What the lines so far say.
+#[derive(Default)]
+struct Content {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    corners: Corners,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Content {
+    /// Takes in a line, or says in a few words what is wrong with it.
+    fn line(&mut self, line: &[u8]) -> Result<(), String> {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => {
+                let position = numbers(&mut words, 3, "the vertex")?;
+                push(&mut self.positions, Vec3::from(position))
+            }
+            Some(b"vn") => {
+                let normal = numbers(&mut words, 3, "the normal")?;
+                push(&mut self.normals, Vec3::from(normal))
+            }
+            Some(b"vt") => {
+                let [u, v, _] = numbers(&mut words, 1, "the texture coordinate")?;
+                push(&mut self.uvs, Vec2::new(u, v))
+            }
+            Some(b"f") => self.face(words),
+            _ => Ok(()),
+        }
+    }
+
+    fn face<'l>(&mut self, words: impl Iterator<Item = &'l [u8]>) -> Result<(), String> {
+        let mut count = 0;
+        let mut fan = [0; 2]; // the first corner and the last
+        for word in words {
+            let corner = self.corner(word)?;
+            let index = self.corners.vertex(corner, self.positions.len())?;
+            if count > 1 {
+                self.triangles.push([fan[0], fan[1], index]);
+            }
+            fan[count.min(1)] = index;
+            count += 1;
+        }
+        if count > 2 { Ok(()) } else { Err(format!("the face has {count} corners; it must have 3 or more")) }
+    }
+
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    #[inline]
+    fn corner(&self, word: &[u8]) -> Result<Corner, String> {
+        let mut parts = word.split(|b| *b == b'/');
+        let position = index(parts.next().unwrap_or_default(), self.positions.len(), "vertex")?;
+        let mut optional = |count: usize, what: &str| match parts.next() {
+            None | Some(b"") => Ok(None),
+            Some(part) => index(part, count, what).map(Some),
+        };
+        let uv = optional(self.uvs.len(), "texture coordinate")?;
+        let normal = optional(self.normals.len(), "normal")?;
+        match parts.next() {
+            None => Ok(Corner { position, uv, normal }),
+            Some(_) => Err("a corner is v, v/vt, v//vn or v/vt/vn".into()),
+        }
     }
 }
 
-/// Whether a line `f …` has three or more corners of whole numbers.
-fn is_face(line: &str) -> bool {
-    let mut corners = line[2..].split_ascii_whitespace().peekable();
-    corners.peek().is_some()
-        && corners.all(|corner| corner.split('/').all(|index| index.is_empty() || index.parse::<i64>().is_ok()))
+/// Numbers are u32 throughout.
+fn push<T>(array: &mut Vec<T>, value: T) -> Result<(), String> {
+    array.push(value);
+    if array.len() < u32::MAX as usize { Ok(()) } else { Err("the file has more than 2³² of these".into()) }
 }
 
-/// Lines without leading blanks; what is not UTF-8 is left out.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = &str> {
-    bytes.split(|b| *b == b'\n').map(|line| std::str::from_utf8(line).unwrap_or_default().trim_start())
+/// The first three numbers on a line, of which as many as `least` must be there and 0 stands for the others.
+#[inline]
+fn numbers<'l>(words: &mut impl Iterator<Item = &'l [u8]>, least: usize, what: &str) -> Result<[f32; 3], String> {
+    let mut numbers = [0.0; 3];
+    for (i, number) in numbers.iter_mut().enumerate() {
+        let Some(word) = words.next() else {
+            return if i < least { Err(format!("{what} has {i} numbers; it needs {least}")) } else { Ok(numbers) };
+        };
+        let value = std::str::from_utf8(word).ok().and_then(|word| word.parse::<f32>().ok());
+        *number = value.ok_or_else(|| format!("{:?} is not a number", shown(word)))?;
+        if !number.is_finite() {
+            return Err(format!("{what} must be finite"));
+        }
+    }
+    Ok(numbers)
 }
+
+/// The place, from 0, that a number from 1 or backwards from −1 stands for among `count`.
+#[inline]
+fn index(word: &[u8], count: usize, what: &str) -> Result<u32, String> {
+    let number = std::str::from_utf8(word).ok().and_then(|word| word.parse::<i64>().ok());
+    let number = number.ok_or_else(|| format!("{:?} is not a whole number", shown(word)))?;
+    let place = if number > 0 { Some(number - 1) } else { (number < 0).then(|| count as i64 + number) };
+    match place.filter(|place| (0..count as i64).contains(place)) {
+        Some(place) => Ok(place as u32),
+        None if number == 0 => Err(format!("{what} 0: numbers begin at 1")),
+        None => Err(format!("{what} {number} of {count}")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

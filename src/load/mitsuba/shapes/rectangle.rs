@@ -12,8 +12,8 @@ use crate::scene::parameters::Parameters;
 /// Reads the rectangle.
 pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
-    let placement = Placement { to_world: p.to_world(), flip_normals };
-    Some(Box::new(move || {
+    let placement = Placement { to_world: p.to_world(), flip_normals, smooth: false };
+    Some(Build::new(move || {
         let (mut mesh, repairs) = raw().place(placement)?;
         mesh.normals.clear(); // they told the front, and the faces are flat
         Ok((mesh, repairs).into())

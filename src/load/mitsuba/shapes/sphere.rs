@@ -31,5 +31,5 @@ pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
         // Mitsuba turns a mirrored sphere inside out, unlike rectangles, disks and cubes.
         flipped: flip_normals != (axes.determinant() < 0.0),
     };
-    Some(Box::new(move || Ok(geometry.into())))
+    Some(Build::ready(geometry))
 }

@@ -1,0 +1,64 @@
+//! A cylinder that emits.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Mat3, Vec2, Vec3};
+
+use super::{Emit, LightSample, per_solid_angle, towards};
+use crate::{
+    math::sin_cos_turn,
+    scene::{Rgb, parametrisation::cylinder_uv, textures::Varying},
+};
+
+/// A cylinder without caps that emits from its outside (from its inside, if flipped), uniform over its area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cylinder {
+    /// Where its axis begins.
+    pub start: Vec3,
+    /// Its length, > 0.
+    pub length: f32,
+    /// Radius, > 0.
+    pub radius: f32,
+    /// Its own axes, orthonormal, of which the third is that of the cylinder.
+    pub axes: Mat3,
+    /// The front is the inside.
+    pub flipped: bool,
+    /// Radiance, W/(m² sr) per channel.
+    pub radiance: Varying,
+}
+
+impl Cylinder {
+    fn area(&self) -> f32 {
+        TAU * self.radius * self.length
+    }
+}
+
+impl Emit for Cylinder {
+    fn power(&self, _scene_radius: f32) -> Rgb {
+        self.radiance.mean() * (PI * self.area())
+    }
+
+    fn largest(&self) -> f32 {
+        self.radiance.largest()
+    }
+
+    #[inline(always)]
+    fn radiance(&self, uv: Vec2) -> Rgb {
+        self.radiance.at(|| uv)
+    }
+
+    #[inline(always)]
+    fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let (sin, cos) = sin_cos_turn(u[0]);
+        let outside = self.axes.x_axis * cos + self.axes.y_axis * sin;
+        let from_start = self.axes.z_axis * (u[1] * self.length) + outside * self.radius;
+        let front = if self.flipped { -outside } else { outside };
+        let radiance = self.radiance.at(|| cylinder_uv(&self.axes, self.length, from_start));
+        towards(p, ng, self.start + from_start, [front; 2], radiance, 1.0 / self.area())
+    }
+
+    #[inline(always)]
+    fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
+        per_solid_angle(1.0 / self.area(), origin, q, n)
+    }
+}
