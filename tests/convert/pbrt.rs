@@ -266,12 +266,12 @@ fn lights_have_the_brightness_that_pbrt_gives_them() {
         &[
             (
                 &format!("AreaLightSource \"diffuse\" \"rgb L\" [ 3 2 1 ] \"float scale\" 2 {square}"),
-                "ply(filename=out-files/bilinearmesh.ply →material area(radiance=6,4,2))",
+                "ply(filename=out-files/bilinearmesh.ply face_normals=true →material area(radiance=6,4,2))",
             ),
             (
                 // each triangle, of area 2, emits 2π
                 &format!("AreaLightSource \"diffuse\" \"float power\" 6.2831855 {square}"),
-                "ply(filename=out-files/bilinearmesh.ply →material area(radiance=1,1,1))",
+                "ply(filename=out-files/bilinearmesh.ply face_normals=true →material area(radiance=1,1,1))",
             ),
             (
                 "AreaLightSource \"diffuse\" \"bool twosided\" true Shape \"sphere\"",
@@ -433,6 +433,21 @@ fn a_ply_file_is_referred_to_where_it_can_be() {
             (
                 "Scale -1 1 1 Shape \"plymesh\" \"string filename\" \"ball.ply\"",
                 "ply(filename=out-files/ball.ply →material)",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn a_mesh_is_smooth_only_where_it_has_normals() {
+    let mesh = "Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ]";
+    assert_each(
+        "shape",
+        &[
+            (mesh, "ply(filename=out-files/trianglemesh.ply face_normals=true →material)"),
+            (
+                &format!("{mesh} \"normal3 N\" [ 0 0 1 0 0 1 0 0 1 ]"),
+                "ply(filename=out-files/trianglemesh.ply →material)",
             ),
         ],
     );

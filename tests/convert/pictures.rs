@@ -94,3 +94,14 @@ fn an_environment_is_seen_where_pbrt_has_it() {
         }
     }
 }
+
+/// Whatever is written is read by relt: the samples with everything have every kind of element that is.
+#[test]
+fn everything_that_is_converted_is_rendered() {
+    for name in ["mitsuba/everything.xml", "pbrt/everything.pbrt"] {
+        let folder = Folder::new();
+        let (_, output) = folder.convert(name).unwrap();
+        let mean = picture(&output, 16.0).mean();
+        assert!(mean.iter().all(|channel| (0.05..5.0).contains(channel)), "{name}: {mean:?}");
+    }
+}

@@ -170,8 +170,10 @@ impl Converter<'_> {
 
     /// A mesh in a file of its own, and its back where that shines as well.
     fn written(&self, mesh: Mesh, area: f64, shines_behind: bool, stem: &str) -> Geometry {
-        let element =
-            |mesh: &Mesh, stem: &str| Element::plugin("shape", "ply").string("filename", &self.files.mesh(stem, mesh));
+        let element = |mesh: &Mesh, stem: &str| {
+            let ply = Element::plugin("shape", "ply").string("filename", &self.files.mesh(stem, mesh));
+            flat_without_normals(ply, mesh)
+        };
         let front = element(&mesh, stem);
         let back = shines_behind.then(|| {
             let mut back = mesh;
@@ -225,9 +227,8 @@ impl Converter<'_> {
         if !is_plain || (is_needy && shape.area_light.is_some()) {
             return None;
         }
-        let element = Element::plugin("shape", "ply")
-            .string("filename", &self.files.reference(path))
-            .transform("to_world", shape.to_world);
+        let element = Element::plugin("shape", "ply").string("filename", &self.files.reference(path));
+        let element = flat_without_normals(element, mesh).transform("to_world", shape.to_world);
         // Mitsuba orders corners after the transform, so a mirror turns what has no normals over there and not in pbrt
         Some(if turns { element.boolean("flip_normals", true) } else { element })
     }
@@ -357,4 +358,9 @@ impl Converter<'_> {
         }
         Some(mesh)
     }
+}
+
+/// Where a mesh has no normals, pbrt shades its triangles and Mitsuba, unless told so, makes some up.
+fn flat_without_normals(element: Element, mesh: &Mesh) -> Element {
+    if mesh.normals.is_empty() { element.boolean("face_normals", true) } else { element }
 }
