@@ -107,8 +107,11 @@ const PLUGINS: &[Plugin] = &[
     ),
 ];
 
+/// Makes the new element of an old one.
+type Wrapper = fn(&Parameters) -> Element;
+
 /// Plugins around others, or made of several.
-const WRAPPERS: &[(&str, fn(&Parameters) -> Element)] = &[
+const WRAPPERS: &[(&str, Wrapper)] = &[
     ("twosided", twosided),
     ("mask", mask),
     ("blendbsdf", blend),

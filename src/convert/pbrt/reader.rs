@@ -112,7 +112,7 @@ impl Reader<'_> {
                 None => Err((place.clone(), "expected a word after it".into())),
             },
             Action::Names(run) => self.quoted(&place).map(|_| {
-                drop(self.next_if(Kind::Quoted));
+                self.next_if(Kind::Quoted);
                 run(state, &place, self.notes);
             }),
             Action::List(run) => self.list(name, &place).map(|list| run(state, list, self.notes)),

@@ -319,7 +319,7 @@ impl Converter<'_> {
 
     /// Vertex indices in groups.
     fn corners(&self, p: &Parameters, indices: &[i64], size: usize) -> Option<Vec<u32>> {
-        if indices.is_empty() || indices.len() % size != 0 {
+        if indices.is_empty() || !indices.len().is_multiple_of(size) {
             let message = format!("{} indices; expected a multiple of {size}", indices.len());
             self.notes.fault(p.place_of("indices"), message);
             return None;

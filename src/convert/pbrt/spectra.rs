@@ -127,10 +127,9 @@ pub fn metal(parameters: &Parameters, [eta, k]: [&str; 2], notes: &Notes) -> Met
     };
     if let (Some(of_eta), Some(of_k)) = (name(given[0], "-eta"), name(given[1], "-k"))
         && of_eta == of_k
+        && let Some(known) = METALS.iter().find(|known| **known == of_eta)
     {
-        if let Some(known) = METALS.iter().find(|known| **known == of_eta) {
-            return Metal::Named(known);
-        }
+        return Metal::Named(known);
     }
     let name = given[0].and_then(Parameter::string).unwrap_or_default();
     if name.starts_with("metal-") {
