@@ -93,6 +93,11 @@ impl Notes {
         self.sources.borrow()[place.source].path.parent().unwrap_or(Path::new("")).to_owned()
     }
 
+    /// The folder of the file that was read first.
+    pub fn home(&self) -> PathBuf {
+        self.sources.borrow().first().and_then(|first| first.path.parent()).unwrap_or(Path::new("")).to_owned()
+    }
+
     /// Something is wrong with the input.
     pub fn fault(&self, place: &Place, message: impl Into<String>) {
         self.faults.borrow_mut().push((place.clone(), message.into()));

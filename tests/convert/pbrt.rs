@@ -454,6 +454,15 @@ fn a_mesh_is_smooth_only_where_it_has_normals() {
 }
 
 #[test]
+fn files_are_seen_from_the_folder_of_the_scene() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("pbrt/parts")).unwrap();
+    std::fs::write(folder.path("pbrt/parts/ball.pbrt"), "Shape \"plymesh\" \"string filename\" \"ball.ply\"").unwrap();
+    let (_, output) = folder.convert_text("pbrt/case.pbrt", &format!("{BEGIN} Include \"parts/ball.pbrt\"")).unwrap();
+    assert_eq!(shown(&output, "shape"), "ply(filename=ball.ply →material)");
+}
+
+#[test]
 fn quadrics_are_exact_where_they_are_whole() {
     assert_each(
         "shape",

@@ -196,10 +196,13 @@ impl<'a> Parameters<'a> {
         transforms::read(self.child(name)?, self.context.notes)
     }
 
-    /// A file, beside the one that names it.
+    /// A file, beside the one that names it or else beside the scene.
     pub fn file(&self, name: &str) -> Option<PathBuf> {
         let child = self.child(name)?;
-        let path = self.context.notes.folder(&child.place).join(child.value("value"));
+        let mut path = self.context.notes.folder(&child.place).join(child.value("value"));
+        if !path.is_file() {
+            path = self.context.notes.home().join(child.value("value"));
+        }
         if !path.is_file() {
             self.context.notes.fault(child.place_of("value"), format!("there is no file {}", path.display()));
         }

@@ -179,11 +179,11 @@ impl Parameters {
         Some(numbers.as_chunks().0.iter().map(|xy| DVec2::from_array(*xy)).collect())
     }
 
-    /// A file, beside the one that names it; it must be there.
+    /// A file, seen from the folder of the scene, whichever file names it; it must be there.
     pub fn file(&self, name: &str, notes: &Notes) -> Option<PathBuf> {
         let parameter = self.get(name, &["string"])?;
         let given = parameter.string().filter(|given| !given.is_empty())?;
-        let path = notes.folder(&parameter.place).join(given);
+        let path = notes.home().join(given);
         if !path.is_file() {
             notes.fault(&parameter.place, format!("there is no file {}", path.display()));
             return None;

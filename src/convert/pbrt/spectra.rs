@@ -65,7 +65,7 @@ fn named(name: &str, parameter: &Parameter, of: Of, notes: &Notes) -> Result<Rgb
     if name.starts_with("stdillum-D65") || name == "illum-acesD60" {
         return Ok([1.0; 3]);
     }
-    let path = notes.folder(&parameter.place).join(name);
+    let path = notes.home().join(name);
     match std::fs::read_to_string(&path) {
         Ok(text) => Spectrum::of_file(&text).map(|s| colour_of(&s, of)).map_err(|m| format!("{}: {m}", path.display())),
         Err(error) => {
