@@ -44,7 +44,7 @@ pub fn value(parameter: &Parameter, of: Of, notes: &Notes) -> Result<Rgb, String
             let samples = numbers.as_chunks().0.iter().map(|[wavelength, value]| (*wavelength, *value)).collect();
             Spectrum::new(samples).map(|spectrum| colour_of(&spectrum, of))
         }
-        ("spectrum", Values::Strings(names)) => named(names.first().map_or("", String::as_str), parameter, of, notes),
+        ("spectrum", Values::Strings(names)) => named(names.first().map_or("", String::as_str), of, notes),
         _ => Err("its value is no colour".into()),
     }
 }
@@ -58,7 +58,7 @@ fn colour_of(spectrum: &Spectrum, of: Of) -> Rgb {
 }
 
 /// A spectrum by name or in a file.
-fn named(name: &str, parameter: &Parameter, of: Of, notes: &Notes) -> Result<Rgb, String> {
+fn named(name: &str, of: Of, notes: &Notes) -> Result<Rgb, String> {
     if let Some((_, index)) = GLASSES.iter().find(|(known, _)| *known == name) {
         return Ok([*index; 3]);
     }
