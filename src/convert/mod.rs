@@ -1,7 +1,7 @@
 //! Scene files of other renderers to Mitsuba 3's XML.
 //!
-//! A format is a folder: [`mitsuba_old`] for Mitsuba 0.5 to 2, [`pbrt`] for pbrt-v4. Either makes a tree of elements
-//! ([`xml`]), files beside it where a scene's own cannot serve ([`files`]), and notes with their places ([`notes`]):
+//! A format is a folder: `mitsuba_old` for Mitsuba 0.5 to 2, `pbrt` for pbrt-v4. Either makes a tree of elements
+//! (`xml`), files beside it where a scene's own cannot serve (`files`), and notes with their places (`notes`):
 //! faults of the input, what is left out because there is no counterpart, and what will look different.
 //!
 //! What is written keeps to the part of Mitsuba 3 that relt reads as well.

@@ -225,10 +225,10 @@ impl Scene {
         // SAFETY, for all four: the scene is committed and alive; packet, mask and arguments have Embree's layout
         // and alignment (asserted in `ffi`) and live for the call.
         match width {
-            // SAFETY: above.
-            Width::W1 => {
-                closest::<Align16, 1, INSTANCES>(rays, hits, |_, packet| unsafe { (f.intersect1)(scene, packet, args) })
-            }
+            Width::W1 => closest::<Align16, 1, INSTANCES>(rays, hits, |_, packet| {
+                // SAFETY: above.
+                unsafe { (f.intersect1)(scene, packet, args) }
+            }),
             Width::W4 => closest::<Align16, 4, INSTANCES>(rays, hits, |valid, packet| {
                 // SAFETY: above.
                 unsafe { (f.intersect4)(valid.lanes.as_ptr(), scene, packet, args) }

@@ -28,7 +28,7 @@ pub struct Appearance {
 pub struct Part {
     /// The scattering function; parameters that vary have any value.
     pub material: Material,
-    /// Textures in the place of parameters, by their numbers in [`Material::varying`].
+    /// Textures in the place of parameters, by their numbers in [`materials::varying`](super::materials::varying).
     pub textures: Vec<(usize, Arc<Texture>)>,
     /// Its weight is the product of these, 1 where there is none.
     pub shares: Vec<Share>,
@@ -199,6 +199,10 @@ impl Appearance {
 
 /// The scattering function at one point.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "it lives on the stack for one vertex; a box would allocate at every hit"
+)]
 pub enum Scattering<'s> {
     /// One that is the same everywhere.
     Plain(&'s Material),

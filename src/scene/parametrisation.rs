@@ -26,14 +26,14 @@ impl Place {
     }
 }
 
-/// On triangle `t` at barycentric coordinates (1 − b − c, b, c). Without texture coordinates those are (b, c) and there
-/// are no tangents to speak of.
+/// On triangle `t` at barycentric coordinates (1 − b − c, b, c); without texture coordinates those are (b, c), and tangents
+/// are edges.
 pub(super) fn of_mesh(mesh: &Mesh, t: u32, b: f32, c: f32, normal: Vec3) -> Place {
     let uv = mesh.uv(t, b, c);
-    if mesh.uvs.is_empty() {
-        return Place::without_direction(uv, normal);
-    }
     let [p0, p1, p2] = mesh.corners(t);
+    if mesh.uvs.is_empty() {
+        return Place { uv, du: p1 - p0, dv: p2 - p0 };
+    }
     let [uv0, uv1, uv2] = mesh.triangles[t as usize].map(|i| mesh.uvs[i as usize]);
     let (a, b) = (uv1 - uv0, uv2 - uv0);
     let determinant = a.perp_dot(b);
@@ -152,7 +152,9 @@ mod tests {
         let flat = of_mesh(&mesh, 0, 0.3, 0.2, Vec3::Z);
         assert_eq!((flat.uv, flat.du.z, flat.dv.z), (Vec2::ONE, 0.0, 0.0), "tangents although coordinates tell none");
         mesh.uvs.clear();
-        assert_eq!(of_mesh(&mesh, 0, 0.3, 0.2, Vec3::Z).uv, Vec2::new(0.3, 0.2));
+        let bare = of_mesh(&mesh, 0, 0.3, 0.2, Vec3::Z);
+        assert_eq!(bare.uv, Vec2::new(0.3, 0.2));
+        check(|uv| corners[0] + (corners[1] - corners[0]) * uv.x + (corners[2] - corners[0]) * uv.y, bare);
     }
 
     #[test]
@@ -200,11 +202,11 @@ mod tests {
         let p = Vec3::new(0.5, 0.3, -1.9131);
         let place = of_sphere(&Mat3::IDENTITY, 2.0, p.normalize());
         assert!((place.uv - Vec2::new(0.086, 0.9058)).length() < 1e-4, "{place:?}");
-        close(place.du, [-1.885, 3.1416, 0.0]);
+        close(place.du, [-1.885, PI, 0.0]);
         close(place.dv, [-5.1537, -3.0922, -1.8318]);
         let place = of_disk(&Mat3::IDENTITY, 2.0, Vec3::new(0.5, 0.3, 0.0));
         assert!((place.uv - Vec2::new(0.2915, 0.086)).length() < 1e-4, "{place:?}");
         close(place.du, [1.715, 1.029, 0.0]);
-        close(place.dv, [-1.885, 3.1416, 0.0]);
+        close(place.dv, [-1.885, PI, 0.0]);
     }
 }

@@ -34,7 +34,7 @@ use crate::scene::{Rgb, parameters::Parameters};
 /// reflect, not even those of metal; energy is not conserved, as lobes add up without taking from each other: of white
 /// light a white base of roughness 1 returns 1.05 times as much as it gets head-on, 1.4 times at 84°. One habit is left
 /// out: at spec_trans = 1 exactly Mitsuba's scalar variants drop the sheen, which is whole at 0.999 and here stays so.
-/// Sources: Burley 2012 and 2015, as in [`burley`]; Mitsuba 3.9's documentation and values.
+/// Sources: Burley 2012 and 2015, as in `burley`; Mitsuba 3.9's documentation and values.
 #[derive(Clone, Copy, Debug)]
 pub struct Principled {
     base_color: Rgb,
