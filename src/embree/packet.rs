@@ -5,8 +5,9 @@
 //!
 //! Hits do not depend on the width, bit for bit: over 10 million rays a scene of each kind — anywhere, after a diffuse
 //! bounce, aimed at edges and corners — on three scenes with SSE4.2, AVX, AVX2 and AVX-512, no id, u, v, t or
-//! occlusion differed (Embree 4.4.0; `tests/embree.rs`). This needs rays not to be marked as coherent, and spheres and
-//! disks of our own (`quadric`). Between instruction sets the last bits of triangle hits do differ.
+//! occlusion differed (Embree 4.4.0; `tests/embree.rs`), nor in instances, over 65,536 rays of each kind. This needs rays
+//! not to be marked as coherent, and spheres, disks and cylinders of our own (`quadric`). Between instruction sets the
+//! last bits of triangle hits do differ.
 
 use super::ffi::{self, Align16, Align32, Align64, Arguments, Ray, RayHit, Valid};
 use super::scene::Scene;
@@ -225,10 +226,10 @@ impl Scene {
         // SAFETY, for all four: the scene is committed and alive; packet, mask and arguments have Embree's layout
         // and alignment (asserted in `ffi`) and live for the call.
         match width {
-            // SAFETY: above.
-            Width::W1 => {
-                closest::<Align16, 1, INSTANCES>(rays, hits, |_, packet| unsafe { (f.intersect1)(scene, packet, args) })
-            }
+            Width::W1 => closest::<Align16, 1, INSTANCES>(rays, hits, |_, packet| {
+                // SAFETY: above.
+                unsafe { (f.intersect1)(scene, packet, args) }
+            }),
             Width::W4 => closest::<Align16, 4, INSTANCES>(rays, hits, |valid, packet| {
                 // SAFETY: above.
                 unsafe { (f.intersect4)(valid.lanes.as_ptr(), scene, packet, args) }

@@ -120,7 +120,7 @@ impl Instance {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DVec3, Mat3};
+    use glam::{DMat3, Mat3};
 
     use super::*;
     use crate::math::{offset_origin, warp};
@@ -355,7 +355,7 @@ mod tests {
             let instance = Instance::new(0, to_world);
             let q = 100.0 * random.direction();
             let p = instance.point_to_world(q);
-            let exact = to_world.matrix3.as_dmat3() * q.as_dvec3() + DVec3::from(to_world.translation.as_dvec3());
+            let exact = to_world.matrix3.as_dmat3() * q.as_dvec3() + to_world.translation.as_dvec3();
             let error = (p.as_dvec3() - exact).abs();
             assert!(error.cmple(instance.error(p, q.abs()).as_dvec3()).all(), "{to_world:?}: {error} at {q}");
         }
