@@ -7,7 +7,8 @@
 //! The life of one mutation runs through the modules in this order: [`sample`] proposes a point, [`path`] maps
 //! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
-//! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines; [`study`] draws what runs
+//! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines; [`convert`] makes such files
+//! of other renderers' scenes; [`study`] draws what runs
 //! leave behind.
 //!
 //! ```standalone_crate
@@ -28,6 +29,7 @@
 
 pub mod chain;
 pub mod cli;
+pub mod convert;
 pub mod embree;
 pub mod film;
 pub mod load;

@@ -1,6 +1,7 @@
 //! Command lines to typed jobs: one file a subcommand.
 
 mod compare;
+mod convert;
 mod failure;
 mod info;
 mod ladder;
@@ -33,6 +34,7 @@ enum Command {
     Study(study::StudyArguments),
     Compare(compare::Compare),
     Reference(Box<reference::Reference>),
+    Convert(convert::Convert),
 }
 
 const EXIT_CODES: &str = "\
@@ -40,6 +42,7 @@ Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
   2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
+       relt convert: also with --strict where something would be left out
   3    relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
   130  ended at once by a second signal, without an image
@@ -62,6 +65,7 @@ pub fn main() -> ExitCode {
         Command::Study(arguments) => study::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Reference(arguments) => reference::run(*arguments),
+        Command::Convert(arguments) => convert::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

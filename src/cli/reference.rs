@@ -11,7 +11,7 @@ use super::failure::Failure;
 use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::film::file::{check_writable, write_whole};
-use crate::film::{Image, Plane, Value, exr_file};
+use crate::film::{Image, PixelFormat, Plane, Value, exr_file};
 use crate::render::progress::significant;
 use crate::render::{self, Job, Method, Observer, PacketChoice, RenderError, Settings, Status};
 use crate::scene::SceneDescription;
@@ -269,7 +269,9 @@ impl Files {
         let (major, minor, patch) = opened.device.version();
         let embree = format!("{major}.{minor}.{patch}");
         let metadata = metadata(recipe, &embree, passes, error);
-        exr_file::write(&self.image, &reference.image, &layers, &metadata).map_err(Failure::running)?;
+        let (format, window) = (PixelFormat::Rgb, opened.scene.film.window); // with a variance by channel
+        exr_file::write_part(&self.image, &reference.image, format, window, &layers, &metadata)
+            .map_err(Failure::running)?;
 
         let text = description(recipe, &embree, passes, &reference.image, error, target);
         write_whole(&self.text, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))

@@ -8,7 +8,7 @@ use std::path::Path;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
 /// A range of bytes of the file's text.
-pub(super) type Span = Range<usize>;
+pub(crate) type Span = Range<usize>;
 
 /// One thing that is wrong with a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,7 +36,7 @@ struct Contents {
 
 /// Collects faults while a file is read.
 #[derive(Debug, Default)]
-pub(super) struct Faults {
+pub(crate) struct Faults {
     found: RefCell<Vec<(Option<Span>, String)>>,
     /// Places whose value is not known, so that what else is wrong there only follows from that.
     unknown: RefCell<Vec<Span>>,
@@ -75,6 +75,13 @@ impl Faults {
         assert!(!found.is_empty(), "reading {} gave neither a scene nor a fault", path.display());
         found.sort_by_key(|(span, _)| span.as_ref().map(|s| s.start));
         found.dedup();
+        Err(LoadError::of_places(path, text, found))
+    }
+}
+
+impl LoadError {
+    /// Faults at these places of the text, or of the file as a whole.
+    pub(crate) fn of_places(path: &Path, text: String, found: Vec<(Option<Span>, String)>) -> LoadError {
         let faults = found
             .into_iter()
             .map(|(span, message)| {
@@ -82,13 +89,11 @@ impl Faults {
                 Fault { message, position, span }
             })
             .collect();
-        Err(LoadError::new(path, text, faults))
+        LoadError::new(path, text, faults)
     }
-}
 
-impl LoadError {
     /// A fault of a file that was not read.
-    pub(super) fn of_file(path: &Path, message: String) -> LoadError {
+    pub(crate) fn of_file(path: &Path, message: String) -> LoadError {
         LoadError::new(path, String::new(), vec![Fault { message, position: None, span: None }])
     }
 
@@ -133,21 +138,21 @@ impl Diagnostic for LoadError {
 }
 
 /// Line and column, from 1, of a byte of the text.
-fn position(text: &str, byte: usize) -> (usize, usize) {
+pub(crate) fn position(text: &str, byte: usize) -> (usize, usize) {
     let before = text.get(..byte).expect("spans begin between characters");
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
 /// `known: a, b, c`, sorted.
-pub(super) fn list(known: &[&str]) -> String {
+pub(crate) fn list(known: &[&str]) -> String {
     let mut known = known.to_vec();
     known.sort_unstable();
     if known.is_empty() { "none is known here".into() } else { format!("known: {}", known.join(", ")) }
 }
 
 /// ` (did you mean "glass"?)` where a known name is near, or nothing.
-pub(super) fn did_you_mean(name: &str, known: &[&str]) -> String {
+pub(crate) fn did_you_mean(name: &str, known: &[&str]) -> String {
     let near = known.iter().map(|k| (edits(name, k), k)).min();
     match near {
         // A third of the letters wrong is no longer a slip of the finger.

@@ -37,7 +37,7 @@ impl Images {
 }
 
 /// Reads one file; what its content is decides, not its name.
-fn read(path: &Path) -> Result<Image, String> {
+pub fn read(path: &Path) -> Result<Image, String> {
     let in_file = |message: String| format!("{}: {message}", path.display());
     let bytes = std::fs::read(path).map_err(|error| in_file(format!("cannot be read: {error}")))?;
     let image = if bytes.starts_with(&OPENEXR) { read_exr(path) } else { decode(&bytes) }.map_err(in_file)?;

@@ -3,14 +3,15 @@
 //! A reader goes on after a fault, so that one [`LoadError`] tells all that is wrong with a file. To add a format:
 //! a new module and a line in `FORMATS`.
 
-mod faults;
-mod images;
+pub(crate) mod faults;
+pub(crate) mod images;
 mod mitsuba;
 mod watch;
 
 use std::path::Path;
 
 pub use faults::{Fault, LoadError};
+pub(crate) use mitsuba::parse_ply;
 pub use watch::Watch;
 
 use crate::scene::SceneDescription;

@@ -45,6 +45,11 @@ impl Picture {
             }
         }
     }
+
+    /// Writes all of it as OpenEXR.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        exr_file::write_part(path, &self.image, self.format, self.window, &self.layers, &self.metadata)
+    }
 }
 
 /// Where pictures go.
@@ -83,8 +88,7 @@ impl Output {
     /// Writes all files; each appears whole or not at all.
     pub fn write(&self, picture: &Picture) -> Result<(), FileError> {
         if let Some(exr) = &self.exr {
-            let Picture { image, format, window, layers, metadata } = picture;
-            exr_file::write_part(exr, image, *format, *window, layers, metadata)?;
+            picture.write(exr)?;
         }
         png_file::write(&self.png, &picture.image)
     }

@@ -16,10 +16,10 @@ use crate::rng::{Counter, Purpose, Rng, SIDE_BY_SIDE};
 
 /// Leading blocks of a stratified point that are low-discrepancy; the later ones are plain random words.
 ///
-/// They are the film position, the first bounce's direction and place on a light, and the block after them: the
-/// first bounce's choices of lobe and light where a scene has any, else the second bounce. relMSE of `path` at 64
-/// mutations per pixel, 3 seeds, with 0, 2, 3 and 4 blocks: `cornell-box` 0.00493, 0.00279, 0.00276, 0.00275; the same
-/// box with six lamps 0.0077, 0.0060, 0.0039, 0.0039. Time of a mutation there: 1, 1.07, 1.10, 1.13.
+/// They are the film position with the place on the lens, the first bounce's direction and place on a light, and the
+/// block after them: the first bounce's choices of lobe and light where a scene has any, else the second bounce. relMSE
+/// of `path` at 64 mutations per pixel, 3 seeds, with 0, 2, 3 and 4 blocks: `cornell-box` 0.00493, 0.00279, 0.00276,
+/// 0.00275; the same box with six lamps 0.0077, 0.0060, 0.0039, 0.0039. Time of a mutation there: 1, 1.07, 1.10, 1.13.
 pub const LOW_DISCREPANCY_BLOCKS: u16 = 3;
 
 /// Block `block` of the stratified point whose pixel and number `counter` names.

@@ -231,8 +231,7 @@ impl Watch<'_> {
     fn note(&self, status: &Status, picture: &Picture, image: Option<PathBuf>) {
         let noted = image.as_ref().map_or(Ok(()), |image| {
             let path = self.runner.folder.path().join(image);
-            exr_file::write(&path, &picture.image, &picture.layers, &picture.metadata)
-                .map_err(|error| error.to_string())
+            picture.write(&path).map_err(|error| error.to_string())
         });
         let moment = Moment {
             wall_seconds: (self.before.wall + status.elapsed).as_secs_f64(),

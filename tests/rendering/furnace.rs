@@ -60,6 +60,15 @@ fn closed_rooms_are_as_bright_with_roulette_from_the_start() {
     check("roulette", &closed("cube", 0.5, -1, 1), 2.0, 0.005);
 }
 
+/// However wide the lens, a room that is equally bright everywhere looks it.
+#[test]
+fn closed_rooms_are_as_bright_through_a_lens() {
+    let lens = "type='thinlens'><float name='aperture_radius' value='0.3'/><float name='focus_distance' value='1'/>";
+    let scene = closed("cube", 0.5, -1, 5).replace("type='perspective'>", lens);
+    assert!(scene.contains(lens));
+    check("lens", &scene, 2.0, 0.005);
+}
+
 /// Weights of either sign make a constant of a constant.
 #[test]
 fn closed_rooms_are_as_bright_through_a_filter_with_negative_lobes() {

@@ -37,6 +37,11 @@ fn textures_are_what_mitsuba_makes_of_them() {
 }
 
 #[test]
+fn thin_sheets_are_what_mitsuba_makes_of_them() {
+    check(&["thin"]);
+}
+
+#[test]
 fn lights_are_what_mitsuba_makes_of_them() {
     check(&["point", "spots", "constant", "sky", "sphere-light", "disk-light", "cylinder-light"]);
 }

@@ -31,6 +31,7 @@ use document::Element;
 use ids::Ids;
 use parameters::ElementParameters;
 use sensors::View;
+pub use shapes::parse_ply;
 use textures::Textures;
 
 /// Reads the text of the scene file at `path`.

@@ -84,9 +84,11 @@ const GRAZING: f32 = 1e-6;
 /// A rule for integrals over the facets that `v` sees (v.y = 0) of functions alike on both sides of that plane, which
 /// are smooth but where v · m passes `critical`, the cosine from which on the interface is not a perfect mirror: `each`
 /// gets normals of one side with weights in proportion to the visible density. Lines of equal slope s along v, and on
-/// them slopes t across it, both in units of α, are cut where total reflection ends.
+/// them slopes t across it, both in units of α, are cut where total reflection ends. Transmittances are off by less than
+/// 2 · 10⁻⁵ where that is inside and 10⁻³ where it is outside, 1 − R by 0.25 % at most (η = 2.4) and 0.06 % on average,
+/// against 64 × 40 points on each piece for roughnesses from 0.01 to 1 and η from 1.3 to 2.4.
 fn visible_normals(facets: Microfacets, v: Vec3, critical: f64, mut each: impl FnMut(Vec3, f64)) {
-    const ALONG: u32 = 16;
+    const ALONG: u32 = 20;
     const ACROSS: u32 = 12;
     let (alpha, sin, cos) = (f64::from(facets.alpha_u), f64::from(v.x), f64::from(v.z));
     let tan = alpha * sin / cos; // facets turn away from s = 1/tan on

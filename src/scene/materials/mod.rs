@@ -16,6 +16,7 @@ mod microfacets;
 mod null;
 mod plastic;
 mod principled;
+mod principledthin;
 mod roughconductor;
 mod roughdielectric;
 mod roughplastic;
@@ -27,11 +28,13 @@ mod tests;
 use glam::Vec3;
 
 pub use conductor::Conductor;
+pub(crate) use conductor::PRESETS as CONDUCTORS;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 pub use null::Null;
 pub use plastic::Plastic;
 pub use principled::Principled;
+pub use principledthin::PrincipledThin;
 pub use roughconductor::RoughConductor;
 pub use roughdielectric::RoughDielectric;
 pub use roughplastic::RoughPlastic;
@@ -287,6 +290,7 @@ registry! {
     "null" => Null,
     "plastic" => Plastic,
     "principled" => Principled,
+    "principledthin" => PrincipledThin,
     "roughconductor" => RoughConductor,
     "roughdielectric" => RoughDielectric,
     "roughplastic" => RoughPlastic,

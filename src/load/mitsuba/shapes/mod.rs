@@ -31,7 +31,10 @@ use crate::load::watch::{self, Source};
 use crate::scene::description::{GroupDescription, InstanceDescription, ShapeDescription, ShapeGeometry, Sides};
 use crate::scene::parameters::Parameters;
 use crate::scene::textures::Varying;
-use mesh::{Placement, RawMesh, Repairs};
+use mesh::{Placement, Repairs};
+
+pub use mesh::RawMesh;
+pub use ply::parse_bytes as parse_ply;
 
 /// What a `type` of shape is.
 #[derive(Clone, Copy)]

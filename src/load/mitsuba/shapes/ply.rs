@@ -29,6 +29,11 @@ pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
     })
 }
 
+/// The content of a file in memory as one mesh.
+pub fn parse_bytes(bytes: &[u8]) -> Result<RawMesh, String> {
+    parse(&mut &bytes[..], bytes.len() as u64)
+}
+
 /// The content of a file of that many bytes as one mesh.
 fn parse(source: &mut impl BufRead, size: u64) -> Result<RawMesh, String> {
     let fault = |message: String| format!("it is no readable PLY: {message}");

@@ -1,0 +1,140 @@
+//! What a conversion has to say: faults of the input, what was left out, and what will look different.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use crate::load::LoadError;
+use crate::load::faults::{Span, position};
+
+/// What a note is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Something that the scene has is not in what was written.
+    LeftOut,
+    /// Something is there in another form, which may look different.
+    Changed,
+}
+
+/// A sentence about a place of the input.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// What it is about.
+    pub kind: Kind,
+    /// The file.
+    pub path: PathBuf,
+    /// Line and column, from 1.
+    pub position: (usize, usize),
+    /// What, and why.
+    pub message: String,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (line, column) = self.position;
+        let kind = match self.kind {
+            Kind::LeftOut => "left out",
+            Kind::Changed => "changed",
+        };
+        write!(f, "{}:{line}:{column}: {kind}: {}", self.path.display(), self.message)
+    }
+}
+
+/// A place in one of the files read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    source: usize,
+    span: Span,
+}
+
+impl Place {
+    /// A range of bytes of the file of that number.
+    pub fn new(source: usize, span: Span) -> Place {
+        Place { source, span }
+    }
+}
+
+/// A file read.
+struct Source {
+    path: PathBuf,
+    text: Rc<str>,
+}
+
+/// Collects what there is to say while files are read.
+#[derive(Default)]
+pub(super) struct Notes {
+    sources: RefCell<Vec<Source>>,
+    faults: RefCell<Vec<(Place, String)>>,
+    /// Each thing once, in the order of the files.
+    notes: RefCell<BTreeSet<(usize, usize, Kind, String)>>,
+}
+
+impl Notes {
+    /// Reads a file; gives its number and its text.
+    pub fn read(&self, path: &Path) -> Result<(usize, Rc<str>), String> {
+        let bytes = std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            format!("{}: is not UTF-8 text: invalid at byte {}", path.display(), error.utf8_error().valid_up_to())
+        })?;
+        Ok(self.add(path, text.into()))
+    }
+
+    /// Adds a file that has been read.
+    pub fn add(&self, path: &Path, text: Rc<str>) -> (usize, Rc<str>) {
+        let mut sources = self.sources.borrow_mut();
+        sources.push(Source { path: path.to_owned(), text: text.clone() });
+        (sources.len() - 1, text)
+    }
+
+    /// The folder of the file that a place is in.
+    pub fn folder(&self, place: &Place) -> PathBuf {
+        self.sources.borrow()[place.source].path.parent().unwrap_or(Path::new("")).to_owned()
+    }
+
+    /// The folder of the file that was read first.
+    pub fn home(&self) -> PathBuf {
+        self.sources.borrow().first().and_then(|first| first.path.parent()).unwrap_or(Path::new("")).to_owned()
+    }
+
+    /// Something is wrong with the input.
+    pub fn fault(&self, place: &Place, message: impl Into<String>) {
+        self.faults.borrow_mut().push((place.clone(), message.into()));
+    }
+
+    /// Something of the scene is not written.
+    pub fn left_out(&self, place: &Place, message: impl Into<String>) {
+        self.note(Kind::LeftOut, place, message.into());
+    }
+
+    /// Something is written in another form.
+    pub fn changed(&self, place: &Place, message: impl Into<String>) {
+        self.note(Kind::Changed, place, message.into());
+    }
+
+    fn note(&self, kind: Kind, place: &Place, message: String) {
+        self.notes.borrow_mut().insert((place.source, place.span.start, kind, message));
+    }
+
+    /// All notes in the order of the files, or the faults, a [`LoadError`] for each faulty file.
+    pub fn settle(self) -> Result<Vec<Note>, Vec<LoadError>> {
+        let sources = self.sources.into_inner();
+        let mut faults = self.faults.into_inner();
+        if faults.is_empty() {
+            let note = |(source, byte, kind, message): (usize, usize, Kind, String)| {
+                let Source { path, text } = &sources[source];
+                Note { kind, path: path.clone(), position: position(text, byte), message }
+            };
+            return Ok(self.notes.into_inner().into_iter().map(note).collect());
+        }
+        faults.sort_by_key(|(place, _)| (place.source, place.span.start));
+        faults.dedup();
+        let errors = sources.iter().enumerate().filter_map(|(number, source)| {
+            let of_file = faults.iter().filter(|(place, _)| place.source == number);
+            let found: Vec<_> = of_file.map(|(place, m)| (Some(place.span.clone()), m.clone())).collect();
+            (!found.is_empty()).then(|| LoadError::of_places(&source.path, source.text.to_string(), found))
+        });
+        Err(errors.collect())
+    }
+}
