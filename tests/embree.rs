@@ -363,7 +363,7 @@ fn disks_are_hit_from_both_sides_within_their_radius() {
 #[test]
 fn cylinders_are_hit_from_both_sides_between_their_ends() {
     let mut random = Random(14);
-    let mut doubtful = 0;
+    let mut excused = 0;
     for round in 0..200 {
         let (start, radius) = (10.0 * random.cube() - 5.0, (4.0 * random.unit() - 3.0).exp());
         let along = if round % 4 == 0 { Vec3::Y } else { random.direction() };
@@ -387,12 +387,12 @@ fn cylinders_are_hit_from_both_sides_between_their_ends() {
             let context =
                 format!("cylinder {start} along {along}, {length} long, radius {radius}; {origin} {direction}");
             assert!(agrees || margin < 1e-4, "{context}: {hit:?}, expected {expected}");
-            doubtful += usize::from(margin < 1e-4);
+            excused += usize::from(!agrees);
             let shadow = scene.occluded_one(origin, direction, f32::INFINITY);
             assert_eq!(shadow, hit.is_some(), "{context}");
         }
     }
-    assert!(doubtful < 1000, "{doubtful} of 10000 rays went uncompared");
+    assert!(excused < 100, "{excused} of 10000 rays grazed the wall or an end, and another answer was let pass");
 }
 
 /// The t at which a ray meets a cylinder, or infinity, by a search for changes of sign of the distance to the wall; and how
@@ -727,7 +727,7 @@ fn normal_of(scene: &Scene, hit: Hit, point: Vec3) -> Vec3 {
         let Geometry::Instance { of, to_world } = &scene.geometries()[hit.instance as usize] else { panic!("{hit:?}") };
         let inverse = to_world.inverse();
         let normal = normal_of(of, Hit { instance: MISS, ..hit }, inverse.transform_point3(point));
-        return Vec3::from(inverse.matrix3.transpose() * normal).normalize();
+        return (inverse.matrix3.transpose() * normal).normalize();
     }
     match &scene.geometries()[hit.geometry as usize] {
         Geometry::Triangles(mesh) => {

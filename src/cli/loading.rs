@@ -44,8 +44,7 @@ impl Building {
         Building { triangles, part: AtomicU64::new(0) }
     }
 
-    /// Takes in the part that is done. Embree counts the steps of several builders one after the other, from 0 again and
-    /// again: the largest counts.
+    /// Takes in the part that is done. Of what comes out of order the largest counts: a bar does not go backwards.
     pub fn tell(&self, part: f64) {
         self.part.fetch_max(part.clamp(0.0, 1.0).to_bits(), Relaxed); // bits of positive numbers are ordered as they are
     }

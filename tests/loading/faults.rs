@@ -543,7 +543,7 @@ fn meshes_that_cannot_be_used_are_faults() {
             "<shape type='serialized'><string name='filename' value='no.serialized'/>\n<integer name='shape_index' value='{value}'/></shape>"
         )
     };
-    let negative = ["2:56: no.serialized: ", "3:36: shape_index is -1; the first mesh of a file is 0"];
+    let negative = ["2:57: no.serialized: ", "3:36: shape_index is -1; the first mesh of a file is 0"];
     assert_faults(&around(&index(-1)), &[], &negative);
     let absent = "<shape type='obj'/>";
     assert_faults(&around(absent), &[], &["2:1: shape \"obj\" needs the parameter \"filename\""]);
