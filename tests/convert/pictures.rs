@@ -64,12 +64,15 @@ fn a_pbrt_scene_looks_as_it_did() {
     check("pbrt/plain.pbrt", 1e-3);
 }
 
+/// What a transform does to a direction.
+type Turn = fn([f32; 3]) -> [f32; 3];
+
 /// `square.exr` is red (1 rather than 0.2) towards −x and green (0.7) towards −y of the light's own coordinates.
 #[test]
 fn an_environment_is_seen_where_pbrt_has_it() {
     let folder = Folder::new();
     // each transform and where a direction of the world is in the light's own coordinates
-    let transforms: [(&str, fn([f32; 3]) -> [f32; 3]); 4] = [
+    let transforms: [(&str, Turn); 4] = [
         ("", |d| d),
         ("Rotate 90 0 0 1", |[x, y, z]| [y, -x, z]),
         ("Scale -1 1 1", |[x, y, z]| [-x, y, z]),
