@@ -51,7 +51,12 @@ impl Window {
 
 /// Relative luminance Y of linear RGB with Rec. 709 primaries and white D65 (ITU-R BT.709), in the six digits that
 /// Mitsuba has. Not [`LUMINANCE`], which is what chains follow.
-const RELATIVE_LUMINANCE: [f32; 3] = [0.212_671, 0.715_16, 0.072_169];
+pub(crate) const RELATIVE_LUMINANCE: [f32; 3] = [0.212_671, 0.715_16, 0.072_169];
+
+/// Y of linear RGB.
+pub(crate) fn relative_luminance(rgb: [f64; 3]) -> f64 {
+    rgb.into_iter().zip(RELATIVE_LUMINANCE).map(|(value, weight)| value * f64::from(weight)).sum()
+}
 
 impl Image {
     /// An image of the given pixels.

@@ -1,8 +1,10 @@
 //! Mathematics that knows nothing of rendering: frames, warps with density and inverse, elementary functions.
 
+mod cumulative;
 mod elementary;
 mod frame;
 pub mod warp;
 
+pub use cumulative::Cumulative;
 pub use elementary::{lift, ln2_scaled_exp, offset_origin, sin_cos_turn};
 pub use frame::Frame;

@@ -13,7 +13,7 @@ use super::{
     materials::{Evaluation, Lobes, Material, Null, Scatter, ScatterSample},
     parametrisation::Place,
     relief::{Relief, Tilt},
-    textures::{Texture, scalar},
+    textures::{Texture, Varying, scalar},
 };
 use crate::math::Frame;
 
@@ -39,44 +39,22 @@ pub struct Part {
 /// A factor w or 1 − w of weights, w within [0, 1].
 #[derive(Clone, Debug)]
 pub struct Share {
-    /// w.
-    pub value: ShareValue,
+    /// w, or a colour of that relative luminance.
+    pub value: Varying,
     /// 1 − w is meant.
     pub is_rest: bool,
 }
 
-/// A number that is the same everywhere or the luminance of a texture.
-#[derive(Clone, Debug)]
-pub enum ShareValue {
-    /// The same everywhere.
-    Constant(f32),
-    /// The luminance of a texture.
-    Textured(Arc<Texture>),
-}
-
 impl Share {
     fn at(&self, place: &Place) -> f32 {
-        let value = match &self.value {
-            ShareValue::Constant(value) => *value,
-            ShareValue::Textured(texture) => scalar(texture.at(place.uv)).clamp(0.0, 1.0),
-        };
+        let value = scalar(self.value.at(|| place.uv)).clamp(0.0, 1.0);
         if self.is_rest { 1.0 - value } else { value }
     }
 
-    /// Whether it is 0 everywhere.
-    fn is_nothing(&self) -> bool {
-        match self.value {
-            ShareValue::Constant(value) => value == f32::from(u8::from(self.is_rest)),
-            ShareValue::Textured(_) => false,
-        }
-    }
-
-    /// Whether it is 1 everywhere.
-    fn is_all(&self) -> bool {
-        match self.value {
-            ShareValue::Constant(value) => value == f32::from(u8::from(!self.is_rest)),
-            ShareValue::Textured(_) => false,
-        }
+    /// The value that it has everywhere, if it has one.
+    fn everywhere(&self) -> Option<f32> {
+        let Varying::Constant(value) = self.value else { return None };
+        Some(if self.is_rest { 1.0 - scalar(value) } else { scalar(value) })
     }
 }
 
@@ -103,15 +81,14 @@ impl Appearance {
     pub const MOST_PARTS: usize = 8;
 
     /// The first where `weight` is 0 and the second where it is 1.
-    pub fn blend(self, other: Appearance, weight: ShareValue) -> Appearance {
+    pub fn blend(self, other: Appearance, weight: Varying) -> Appearance {
         let shared = |appearance: Appearance, is_rest: bool| {
             let share = Share { value: weight.clone(), is_rest };
             appearance.parts.into_iter().filter_map(move |mut part| {
-                if share.is_nothing() {
-                    return None;
-                }
-                if !share.is_all() {
-                    part.shares.push(share.clone());
+                match share.everywhere() {
+                    Some(0.0) => return None,
+                    Some(1.0) => {}
+                    _ => part.shares.push(share.clone()),
                 }
                 Some(part)
             })
@@ -121,7 +98,7 @@ impl Appearance {
     }
 
     /// As much of it as `opacity` says, with nothing in between.
-    pub fn masked(self, opacity: ShareValue) -> Appearance {
+    pub fn masked(self, opacity: Varying) -> Appearance {
         Appearance::from(Material::Null(Null)).blend(self, opacity)
     }
 
@@ -157,8 +134,8 @@ impl Appearance {
         self.parts.iter().flat_map(|part| {
             let of_parameters = part.textures.iter().map(|(_, texture)| texture);
             let of_shares = part.shares.iter().filter_map(|share| match &share.value {
-                ShareValue::Textured(texture) => Some(texture),
-                ShareValue::Constant(_) => None,
+                Varying::Textured(texture) => Some(texture),
+                Varying::Constant(_) => None,
             });
             of_parameters.chain(of_shares).chain(part.relief.as_ref().map(Relief::texture))
         })
@@ -338,10 +315,14 @@ mod tests {
         Material::Conductor(mirror).into()
     }
 
+    fn number(value: f32) -> Varying {
+        Varying::Constant(Rgb::splat(value))
+    }
+
     /// Left half 0, right half 1, nearly.
-    fn halves() -> ShareValue {
+    fn halves() -> Varying {
         let texels = (0..64).map(|i| [f32::from(u8::from(i >= 32)); 3]).collect();
-        ShareValue::Textured(Arc::new(Texture::Bitmap(Bitmap::of_texels(64, 1, texels))))
+        Varying::Textured(Arc::new(Texture::Bitmap(Bitmap::of_texels(64, 1, texels))))
     }
 
     fn at(appearance: &Appearance, u: f32) -> Mixture {
@@ -365,10 +346,10 @@ mod tests {
     #[test]
     fn mixtures_reflect_what_their_parts_do() {
         let wo = Vec3::new(0.6, 0.0, 0.8);
-        let blend = diffuse(0.5).blend(mirror(), ShareValue::Constant(0.25));
+        let blend = diffuse(0.5).blend(mirror(), number(0.25));
         let [all, _] = means(&at(&blend, 0.0), wo);
         assert!((all - (0.75 * 0.5 + 0.25 * 0.9)).abs() < 2e-3, "{all}");
-        let nested = blend.masked(ShareValue::Constant(0.25)).blend(diffuse(1.0), ShareValue::Constant(0.5));
+        let nested = blend.masked(number(0.25)).blend(diffuse(1.0), number(0.5));
         assert_eq!(nested.parts().len(), 4);
         let [all, straight] = means(&at(&nested, 0.0), wo);
         assert!((straight - 0.5 * 0.75).abs() < 0.03, "{straight}");
@@ -378,11 +359,11 @@ mod tests {
     #[test]
     fn values_and_densities_are_weighted_sums() {
         let (wo, wi) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.6, 0.8));
-        let blend = diffuse(0.5).blend(diffuse(0.9), ShareValue::Constant(0.25));
+        let blend = diffuse(0.5).blend(diffuse(0.9), number(0.25));
         let value = at(&blend, 0.0).evaluate(wo, wi);
         let cos = 0.8 * std::f32::consts::FRAC_1_PI;
         assert!((value.value.x - 0.6 * cos).abs() < 1e-6 && (value.pdf - cos).abs() < 1e-6, "{value:?}");
-        let masked = diffuse(0.5).masked(ShareValue::Constant(0.25));
+        let masked = diffuse(0.5).masked(number(0.25));
         let value = at(&masked, 0.0).evaluate(wo, wi);
         assert!((value.value.x - 0.125 * cos).abs() < 1e-6 && (value.pdf - 0.25 * cos).abs() < 1e-6, "{value:?}");
     }
@@ -397,7 +378,7 @@ mod tests {
 
     #[test]
     fn parameters_follow_their_texture() {
-        let ShareValue::Textured(texture) = halves() else { unreachable!() };
+        let Varying::Textured(texture) = halves() else { unreachable!() };
         let material = Material::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) });
         let textured = Appearance::from(Part { textures: vec![(0, texture)], ..Part::from(material) });
         assert!(textured.plain().is_none());
@@ -407,12 +388,12 @@ mod tests {
     #[test]
     fn weights_of_nothing_and_of_all_leave_one_part() {
         for (weight, reflectance) in [(0.0, 0.2), (1.0, 0.8)] {
-            let blend = diffuse(0.2).blend(diffuse(0.8), ShareValue::Constant(weight));
+            let blend = diffuse(0.2).blend(diffuse(0.8), number(weight));
             let Some(Material::Diffuse(only)) = blend.plain() else { panic!("{blend:?}") };
             assert_eq!(only.reflectance.x, reflectance);
         }
-        assert!(diffuse(0.2).masked(ShareValue::Constant(1.0)).plain().is_some());
-        let nothing = diffuse(0.2).masked(ShareValue::Constant(0.0));
+        assert!(diffuse(0.2).masked(number(1.0)).plain().is_some());
+        let nothing = diffuse(0.2).masked(number(0.0));
         assert_eq!(nothing.lobes(), Lobes { straight: true, ..Lobes::NONE });
     }
 }

@@ -6,6 +6,7 @@ use super::{
     Profile, Rgb, SceneDescription,
     lights::{Light, LightSample},
 };
+use crate::math::Cumulative;
 
 /// All lights and the probabilities of choosing them.
 #[derive(Clone, Debug)]
@@ -14,8 +15,8 @@ pub struct Emitters {
     /// Probability of choosing each light: half uniform, half in proportion to power, so that a light of little
     /// power is not forgotten where it is the only one in sight.
     probability: Vec<f32>,
-    /// Upper ends of the lights' shares of [0, 1].
-    cumulative: Vec<f32>,
+    /// The choice, by those; `None` without lights.
+    choice: Option<Cumulative>,
     /// The light at infinity, if any; a scene has one at most.
     surrounding: Option<u32>,
 }
@@ -42,18 +43,8 @@ impl Emitters {
             false => uniform,
         };
         let probability: Vec<f32> = lights.iter().map(|light| share(light) as f32).collect();
-        let mut sum = 0.0f64;
-        let mut cumulative: Vec<f32> = probability
-            .iter()
-            .map(|&p| {
-                sum += f64::from(p);
-                sum as f32
-            })
-            .collect();
-        if let Some(last) = cumulative.last_mut() {
-            *last = 1.0;
-        }
-        (Emitters { lights, probability, cumulative, surrounding }, of_shape)
+        let choice = (!lights.is_empty()).then(|| Cumulative::new(probability.iter().map(|&p| f64::from(p))));
+        (Emitters { lights, probability, choice, surrounding }, of_shape)
     }
 
     /// The largest channel of any radiance or intensity; a scale for the brightness of paths.
@@ -75,8 +66,8 @@ impl Emitters {
             return None;
         }
         let light = self.surrounding? as usize;
-        let pdf = self.lights[light].pdf::<P>(Vec3::ZERO, d, d);
-        Some((self.lights[light].radiance_from(d), self.probability[light] * pdf))
+        let (radiance, pdf) = self.lights[light].surrounding(d);
+        Some((radiance, self.probability[light] * pdf))
     }
 
     /// Samples a direction from the surface point `p` with geometric normal `ng`: `u` for the place on the light,
@@ -86,7 +77,7 @@ impl Emitters {
         if self.lights.len() == 1 {
             return self.lights[0].sample::<P>(p, ng, u);
         }
-        let light = self.cumulative.partition_point(|&end| end <= choice).min(self.lights.len() - 1);
+        let light = self.choice.as_ref()?.index(choice);
         let probability = self.probability[light];
         let sample = self.lights[light].sample::<P>(p, ng, u)?;
         Some(LightSample { weight: sample.weight / probability, pdf: sample.pdf * probability, ..sample })

@@ -33,6 +33,8 @@ pub trait Parameters {
     fn boolean(&mut self, name: &str) -> Option<bool>;
     /// A string.
     fn string(&mut self, name: &str) -> Option<String>;
+    /// A word, as its number among those known; another one is a fault that lists them.
+    fn word(&mut self, name: &str, known: &[&str]) -> Option<usize>;
     /// A colour, given as one or as three numbers.
     fn rgb(&mut self, name: &str) -> Option<Rgb>;
     /// A number, or the name of one in a table.
@@ -74,6 +76,56 @@ pub trait Parameters {
                 Rgb::splat(default)
             }
         }
+    }
+}
+
+/// A parameter in whose place a texture can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VaryingParameter {
+    /// Its name.
+    pub name: &'static str,
+    /// What values it takes.
+    pub range: Range,
+}
+
+impl VaryingParameter {
+    /// A colour with channels within 0…1.
+    pub const fn reflectance(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Reflectance }
+    }
+
+    /// A number within 0…1.
+    pub const fn fraction(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Fraction }
+    }
+
+    /// A number that is not negative.
+    pub const fn roughness(name: &'static str) -> VaryingParameter {
+        VaryingParameter { name, range: Range::Roughness }
+    }
+}
+
+/// What values a parameter takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Colours with channels within 0…1.
+    Reflectance,
+    /// Numbers within 0…1; of a texture, its luminance.
+    Fraction,
+    /// Numbers that are not negative; of a texture, its luminance.
+    Roughness,
+    /// Colours with channels that are not negative.
+    Radiance,
+}
+
+impl Range {
+    /// Whether values from `least` to `largest` are within; in words, what would be, where they are not.
+    pub fn check(self, [least, largest]: [f32; 2]) -> Result<(), &'static str> {
+        let (is_within, accepted) = match self {
+            Range::Reflectance | Range::Fraction => (least >= 0.0 && largest <= 1.0, "0 to 1"),
+            Range::Roughness | Range::Radiance => (least >= 0.0, "not negative"),
+        };
+        if is_within { Ok(()) } else { Err(accepted) }
     }
 }
 

@@ -171,11 +171,11 @@ impl Scene {
         let back = ns.dot(direction) >= 0.0;
         let flip = back && shape.two_sided;
         let index = shape.appearances[usize::from(back)] as usize;
-        let frame = Frame::new(if flip { -ns } else { ns });
         let light = if back { NO_LIGHT } else { shape.light };
         if P::VARYING && shape.varies {
             return self.varying_surface(shape, hit, direction, &point, flip, index, light);
         }
+        let frame = Frame::new(if flip { -ns } else { ns });
         Surface {
             p: point.p,
             ng: point.ng,

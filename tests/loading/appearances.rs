@@ -1,12 +1,13 @@
 //! Textures, mixtures and reliefs: what files make of them, and what is wrong with those that make nothing.
 
 use crate::files::{Folder, around, scene_beside};
+use glam::Vec3;
 use relt::film::Image;
 use relt::film::exr_file;
 use relt::scene::SceneDescription;
-use relt::scene::appearance::{Appearance, ShareValue};
+use relt::scene::appearance::Appearance;
 use relt::scene::description::Sides;
-use relt::scene::textures::Texture;
+use relt::scene::textures::{Texture, Varying};
 
 const COLOURS: &[u8] = include_bytes!("../mitsuba/textures/colours.png");
 const HUGE: &[u8] = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 70000 +X 70000\n";
@@ -96,7 +97,7 @@ fn textures_say_what_they_do_not_know() {
         ("<texture type='bitmap' id='a'/>", "2:1: texture \"bitmap\" needs the parameter \"filename\""),
         (
             "<texture type='bitmap'><string name='filename' value='colours.png'/>\n<string name='wrap_mode' value='turn'/></texture>",
-            "3:33: unknown wrap_mode \"turn\"; known: repeat, mirror, clamp",
+            "3:33: unknown wrap_mode \"turn\"; known: clamp, mirror, repeat",
         ),
         (
             "<texture type='bitmap'><string name='filename' value='colours.png'/>\n<string name='filter_type' value='sinc'/></texture>",
@@ -243,7 +244,7 @@ fn masks_may_be_around_two_sides() {
     let names = sides(&scene).map(|side| side.parts().iter().map(|part| part.material.name()).collect::<Vec<_>>());
     assert_eq!(names, [["null", "diffuse"], ["null", "conductor"]]);
     let share = &sides(&scene)[0].parts()[0].shares[0];
-    assert!(matches!(share.value, ShareValue::Constant(0.25)) && share.is_rest);
+    assert!(share.value == Varying::Constant(Vec3::splat(0.25)) && share.is_rest);
 }
 
 #[test]

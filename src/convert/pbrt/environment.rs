@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 
 use crate::film::Image;
+use crate::film::image::relative_luminance;
 
 /// Samples of the square that make a pixel, along each side of it.
 const SUBSAMPLES: usize = 4;
@@ -81,8 +82,7 @@ pub fn illuminance(square: &Image) -> f64 {
         let distance = 1.0 - (u.abs() + v.abs());
         let r = 1.0 - distance.abs();
         let cosine = (1.0 - r * r).copysign(distance).max(0.0);
-        let [r, g, b] = rgb.map(f64::from);
-        sum += cosine * (0.212_671 * r + 0.715_160 * g + 0.072_169 * b);
+        sum += cosine * relative_luminance(rgb.map(f64::from));
     }
     sum * 2.0 * PI / square.pixels.len() as f64
 }

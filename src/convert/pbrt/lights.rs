@@ -15,6 +15,7 @@ use super::textures::upside_down;
 use crate::convert::Rgb;
 use crate::convert::textures::{Picture, Pixels, Texture, Use, Wrap};
 use crate::convert::xml::Element;
+use crate::film::image::relative_luminance;
 use crate::load::faults::{did_you_mean, list};
 
 type Make = fn(&Converter, &Parameters, DAffine3) -> Option<Element>;
@@ -83,10 +84,7 @@ impl Converter<'_> {
     fn picture_radiance(&self, light: &Parameters, picture: &Texture, area: f64) -> Texture {
         let mean = |texture: &Texture| match texture {
             Texture::Picture(Picture { pixels: Pixels::File { path, raw }, .. }) => {
-                self.files.read_picture(path, *raw).map(|image| {
-                    let [r, g, b] = image.mean();
-                    0.212_671 * r + 0.715_160 * g + 0.072_169 * b
-                })
+                self.files.read_picture(path, *raw).map(|image| relative_luminance(image.mean()))
             }
             _ => Ok(1.0),
         };

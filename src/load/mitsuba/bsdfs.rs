@@ -10,12 +10,12 @@ use super::parameters::ElementParameters;
 use super::textures::Textures;
 use crate::load::faults::Faults;
 use crate::scene::Rgb;
-use crate::scene::appearance::{Appearance, Part, ShareValue};
+use crate::scene::appearance::{Appearance, Part};
 use crate::scene::description::Sides;
-use crate::scene::materials::{self, Diffuse, Material, Range};
-use crate::scene::parameters::Parameters;
+use crate::scene::materials::{self, Diffuse, Material};
+use crate::scene::parameters::{Parameters, Range};
 use crate::scene::relief::{Relief, ReliefKind};
-use crate::scene::textures::Texture;
+use crate::scene::textures::{Texture, Varying};
 
 /// Reads each element once and lists the appearances that shapes use.
 pub struct Library<'a> {
@@ -305,12 +305,12 @@ impl<'a> Library<'a> {
     }
 
     /// A part of one, as a number or as a texture; without default it must be there.
-    fn share(&self, p: &mut ElementParameters<'a>, name: &str, default: Option<f32>) -> Option<ShareValue> {
+    fn share(&self, p: &mut ElementParameters<'a>, name: &str, default: Option<f32>) -> Option<Varying> {
         if let Some(texture) = p.texture(name, Range::Fraction) {
-            return texture.map(ShareValue::Textured);
+            return texture.map(Varying::Textured);
         }
         let Some(value) = p.float(name).or(default) else {
-            if !p.has(name) {
+            if !p.is_given(name) {
                 p.fault("", format!("{} needs the parameter {name:?}", p.element.described()));
             }
             return None;
@@ -319,7 +319,7 @@ impl<'a> Library<'a> {
             p.fault(name, format!("{name} is {value}; it must lie between 0 and 1"));
             return None;
         }
-        Some(ShareValue::Constant(value))
+        Some(Varying::Constant(Rgb::splat(value)))
     }
 
     /// A mixture of no more parts than a hit has room for.

@@ -5,8 +5,7 @@ use super::parameters::ElementParameters;
 use super::textures::Textures;
 use crate::load::faults::Faults;
 use crate::scene::lights::{self, Light};
-use crate::scene::materials::Range;
-use crate::scene::parameters::Parameters;
+use crate::scene::parameters::{Parameters, Range};
 use crate::scene::textures::Varying;
 
 /// The emitter inside a shape.

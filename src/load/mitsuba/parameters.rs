@@ -10,8 +10,7 @@ use super::textures::Textures;
 use super::{transforms, values};
 use crate::load::faults::{Faults, did_you_mean, list};
 use crate::scene::Rgb;
-use crate::scene::materials::{Range, VaryingParameter};
-use crate::scene::parameters::{NumberOrName, Parameters};
+use crate::scene::parameters::{NumberOrName, Parameters, Range, VaryingParameter};
 use crate::scene::textures::{Image, Texture};
 
 /// Reads an element; [`finish`](Self::finish) then reports all in it that nothing asked for.
@@ -60,11 +59,6 @@ impl<'a> ElementParameters<'a> {
         std::mem::take(&mut self.textured)
     }
 
-    /// Whether there is a child of that name.
-    pub fn has(&self, name: &str) -> bool {
-        self.child(name).is_some()
-    }
-
     /// The texture in the place of a parameter; `None` where the parameter is something else or absent, `Some(None)`
     /// where the texture is faulty.
     pub fn texture(&mut self, name: &str, range: Range) -> Option<Option<Arc<Texture>>> {
@@ -111,14 +105,8 @@ impl<'a> ElementParameters<'a> {
 
     /// The string of that name, which must be one of those known, or the default.
     pub fn choice<T: Copy>(&mut self, name: &str, known: &[(&str, T)], default: T) -> T {
-        let Some(element) = self.value(name, &["string"]) else { return default };
-        let given = element.value("value");
-        if let Some((_, value)) = known.iter().find(|(k, _)| *k == given) {
-            return *value;
-        }
-        let known: Vec<_> = known.iter().map(|(k, _)| *k).collect();
-        self.faults.unknown(element.span_of("value"), name, given, &known);
-        default
+        let words: Vec<_> = known.iter().map(|(word, _)| *word).collect();
+        self.word(name, &words).map_or(default, |i| known[i].1)
     }
 
     /// Whether there is a parameter of that name, faulty or not.
@@ -220,6 +208,16 @@ impl Parameters for ElementParameters<'_> {
 
     fn string(&mut self, name: &str) -> Option<String> {
         self.parsed(name, &["string"], |text| Ok(text.to_string()))
+    }
+
+    fn word(&mut self, name: &str, known: &[&str]) -> Option<usize> {
+        let element = self.value(name, &["string"])?;
+        let given = element.value("value");
+        let found = known.iter().position(|word| *word == given);
+        if found.is_none() {
+            self.faults.unknown(element.span_of("value"), name, given, known);
+        }
+        found
     }
 
     fn rgb(&mut self, name: &str) -> Option<Rgb> {

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec3};
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
@@ -38,13 +38,9 @@ impl Emit for Cylinder {
         self.radiance.mean() * (PI * self.area())
     }
 
-    fn largest(&self) -> f32 {
-        self.radiance.largest()
-    }
-
     #[inline(always)]
-    fn radiance(&self, uv: Vec2) -> Rgb {
-        self.radiance.at(|| uv)
+    fn surface(&self) -> Option<&Varying> {
+        Some(&self.radiance)
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, Vec3};
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
@@ -36,13 +36,9 @@ impl Emit for Disk {
         self.radiance.mean() * (PI * PI * self.radius * self.radius)
     }
 
-    fn largest(&self) -> f32 {
-        self.radiance.largest()
-    }
-
     #[inline(always)]
-    fn radiance(&self, uv: Vec2) -> Rgb {
-        self.radiance.at(|| uv)
+    fn surface(&self) -> Option<&Varying> {
+        Some(&self.radiance)
     }
 
     #[inline(always)]

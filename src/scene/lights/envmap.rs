@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 
 use super::{Emit, LightSample, origin_towards};
-use crate::math::sin_cos_turn;
+use crate::math::{Cumulative, sin_cos_turn};
 use crate::path::luminance;
 use crate::scene::{
     Rgb,
@@ -39,10 +39,9 @@ struct Map {
     rows: usize,
     /// Texels, (rows + 1) × columns, scaled.
     texels: Vec<Rgb>,
-    /// Upper ends of the rows' shares of [0, 1].
-    row_ends: Vec<f32>,
-    /// Upper ends of the cells' shares of [0, 1] within each row.
-    cell_ends: Vec<f32>,
+    /// The choice among rows of cells, and that among the cells of each.
+    of_rows: Cumulative,
+    of_cells: Vec<Cumulative>,
     /// cos θ at the upper border of each row of cells and at the lower one of the last.
     cosines: Vec<f32>,
     /// The picture's axes in the world, orthonormal.
@@ -90,11 +89,11 @@ impl Envmap {
         Some(Envmap(Arc::new(Map::new(texels, image.width as usize, axes))))
     }
 
-    /// Radiance from the direction `d`.
+    /// Radiance from the direction `d`, and the density of sampling it.
     #[inline]
-    pub(super) fn radiance_from(&self, d: Vec3) -> Rgb {
+    pub(super) fn surrounding(&self, d: Vec3) -> (Rgb, f32) {
         let ([column, row], t) = self.0.cell(d);
-        self.0.within(row, column, t)
+        (self.0.within(row, column, t), self.0.density(row, column))
     }
 }
 
@@ -104,32 +103,22 @@ impl Map {
         let cosines: Vec<f32> =
             (0..=rows).map(|row| libm::cos(std::f64::consts::PI * row as f64 / rows as f64) as f32).collect();
         let mut row_weights = Vec::with_capacity(rows);
-        let mut cell_ends = Vec::with_capacity(rows * columns);
+        let mut of_cells = Vec::with_capacity(rows);
         let mut mean = glam::DVec3::ZERO;
         for row in 0..rows {
             let size = f64::from(cosines[row] - cosines[row + 1]) / (2.0 * columns as f64); // of the whole sphere
-            let mut sum = 0.0;
-            for column in 0..columns {
+            let middle = |column| {
                 let corners = corners(&texels, columns, row, column);
-                let radiance = corners.iter().map(|c| c.as_dvec3()).sum::<glam::DVec3>() / 4.0;
-                mean += radiance * size;
-                sum += f64::from(luminance(radiance.as_vec3()));
-                cell_ends.push(sum as f32);
-            }
-            normalise(&mut cell_ends[row * columns..]);
-            row_weights.push(sum * size);
+                corners.iter().map(|c| c.as_dvec3()).sum::<glam::DVec3>() / 4.0
+            };
+            let weights: Vec<_> = (0..columns).map(|column| f64::from(luminance(middle(column).as_vec3()))).collect();
+            mean += (0..columns).map(middle).sum::<glam::DVec3>() * size;
+            row_weights.push(weights.iter().sum::<f64>() * size);
+            of_cells.push(Cumulative::new(weights.into_iter()));
         }
-        let mut sum = 0.0;
-        let mut row_ends: Vec<f32> = row_weights
-            .iter()
-            .map(|weight| {
-                sum += weight;
-                sum as f32
-            })
-            .collect();
-        normalise(&mut row_ends);
+        let of_rows = Cumulative::new(row_weights.into_iter());
         let largest = texels.iter().map(|t| t.max_element()).fold(0.0, f32::max);
-        Map { columns, rows, texels, row_ends, cell_ends, cosines, axes, mean: mean.as_vec3(), largest }
+        Map { columns, rows, texels, of_rows, of_cells, cosines, axes, mean: mean.as_vec3(), largest }
     }
 
     /// The cell in the direction `d`, and how far in it that is: from the left, from above.
@@ -155,10 +144,8 @@ impl Map {
     /// Density of sampling any direction in a cell, with respect to solid angle.
     #[inline]
     fn density(&self, row: usize, column: usize) -> f32 {
-        let share_of_row = share(&self.row_ends, row);
-        let share_of_cell = share(&self.cell_ends[row * self.columns..][..self.columns], column);
         let solid_angle = TAU / self.columns as f32 * (self.cosines[row] - self.cosines[row + 1]);
-        share_of_row * share_of_cell / solid_angle
+        self.of_rows.share(row) * self.of_cells[row].share(column) / solid_angle
     }
 }
 
@@ -168,30 +155,6 @@ fn corners(texels: &[Rgb], columns: usize, row: usize, column: usize) -> [Rgb; 4
     let right = if column + 1 == columns { 0 } else { column + 1 };
     let (above, below) = (row * columns, (row + 1) * columns);
     [texels[above + column], texels[above + right], texels[below + column], texels[below + right]]
-}
-
-/// Sums to shares of their last; all alike where that is 0.
-fn normalise(ends: &mut [f32]) {
-    let count = ends.len();
-    let total = ends[count - 1];
-    for (i, end) in ends.iter_mut().enumerate() {
-        *end = if total > 0.0 { (*end / total).min(1.0) } else { (i + 1) as f32 / count as f32 };
-    }
-    ends[count - 1] = 1.0;
-}
-
-/// The part of [0, 1] that belongs to number `i`.
-#[inline]
-fn share(ends: &[f32], i: usize) -> f32 {
-    ends[i] - if i == 0 { 0.0 } else { ends[i - 1] }
-}
-
-/// The number whose share of [0, 1] holds `u`, and where in that share it lies.
-#[inline]
-fn choose(ends: &[f32], u: f32) -> (usize, f32) {
-    let i = ends.partition_point(|&end| end <= u).min(ends.len() - 1);
-    let start = if i == 0 { 0.0 } else { ends[i - 1] };
-    (i, ((u - start) / (ends[i] - start)).clamp(0.0, 1.0))
 }
 
 impl Emit for Envmap {
@@ -207,8 +170,8 @@ impl Emit for Envmap {
     #[inline]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let map = &*self.0;
-        let (row, down) = choose(&map.row_ends, u[1]);
-        let (column, across) = choose(&map.cell_ends[row * map.columns..][..map.columns], u[0]);
+        let (row, down) = map.of_rows.choose(u[1]);
+        let (column, across) = map.of_cells[row].choose(u[0]);
         let (high, low) = (map.cosines[row], map.cosines[row + 1]);
         let cos = high + (low - high) * down;
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
@@ -247,7 +210,7 @@ mod tests {
         let at = |column: f32, row: f32| {
             let (phi, theta) = (TAU * (column + 0.5) / 8.0, PI * row / 4.0);
             let d = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-            map.radiance_from(d).x
+            radiance_from(&map, d).x
         };
         for (column, row, value) in [(2.0, 1.0, 10.0), (0.0, 3.0, 24.0), (7.0, 2.0, 23.0), (3.0, 1.5, 15.0)] {
             assert!((at(column, row) - value).abs() < 1e-3, "({column}, {row}) is {}", at(column, row));
@@ -266,7 +229,7 @@ mod tests {
             let sample = map.sample(Vec3::ZERO, Vec3::Y, [a, b]).unwrap();
             let pdf = map.pdf(Vec3::ZERO, sample.wi, sample.wi);
             assert!((pdf / sample.pdf - 1.0).abs() < 1e-3 || on_a_border(&map, sample.wi), "{pdf} for {}", sample.pdf);
-            let expected = map.radiance_from(sample.wi);
+            let expected = radiance_from(&map, sample.wi);
             let error = (sample.weight * sample.pdf - expected).abs().max_element();
             assert!(error < 2e-3 * (1.0 + expected.max_element()), "{expected} in {}", sample.wi);
             radiance += sample.weight.as_dvec3();
@@ -276,6 +239,10 @@ mod tests {
         let exact = integral(&map);
         let got = radiance / n as f64;
         assert!(((got - exact) / exact).abs().max_element() < 0.01, "{got} for {exact}");
+    }
+
+    fn radiance_from(map: &Envmap, d: Vec3) -> Rgb {
+        map.surrounding(d).0
     }
 
     /// Whether rounding may put a direction into the neighbouring cell.
@@ -293,7 +260,7 @@ mod tests {
             for column in 0..columns {
                 let phi = TAU * (column as f32 + 0.5) / columns as f32;
                 let local = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-                sum += map.radiance_from(map.0.axes * local).as_dvec3() * f64::from(theta.sin());
+                sum += radiance_from(map, map.0.axes * local).as_dvec3() * f64::from(theta.sin());
             }
         }
         sum * (2.0 * std::f64::consts::PI * std::f64::consts::PI / f64::from(rows * columns))

@@ -2,11 +2,11 @@
 
 use std::{f32::consts::PI, sync::Arc};
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::{Emit, LightSample, per_solid_angle, towards};
 use crate::{
-    math::warp,
+    math::{Cumulative, warp},
     scene::{Mesh, Rgb, textures::Varying},
 };
 
@@ -14,8 +14,8 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct MeshLight {
     mesh: Arc<Mesh>,
-    /// Upper ends of the triangles' shares of [0, 1], in proportion to area.
-    cumulative: Vec<f32>,
+    /// In proportion to area.
+    triangles: Cumulative,
     inverse_area: f32,
     radiance: Varying,
 }
@@ -31,27 +31,14 @@ impl MeshLight {
     pub fn new(mesh: Arc<Mesh>, radiance: Varying) -> MeshLight {
         let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
         let total: f64 = areas.iter().sum();
-        let mut sum = 0.0;
-        let mut cumulative: Vec<f32> = areas
-            .iter()
-            .map(|area| {
-                sum += area / total;
-                sum as f32
-            })
-            .collect();
-        if let Some(last) = cumulative.last_mut() {
-            *last = 1.0;
-        }
-        MeshLight { mesh, cumulative, inverse_area: (1.0 / total) as f32, radiance }
+        MeshLight { mesh, triangles: Cumulative::new(areas.into_iter()), inverse_area: (1.0 / total) as f32, radiance }
     }
 
     /// A point with the geometric and the shading normal there and the radiance. The first number also chooses the triangle, so that
     /// near numbers give near points of one triangle.
     #[inline(always)]
     fn point(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
-        let triangle = self.cumulative.partition_point(|&end| end <= u[0]).min(self.cumulative.len() - 1);
-        let start = if triangle == 0 { 0.0 } else { self.cumulative[triangle - 1] };
-        let within = ((u[0] - start) / (self.cumulative[triangle] - start)).clamp(0.0, 1.0);
+        let (triangle, within) = self.triangles.choose(u[0]);
         let [b, c] = warp::triangle([within, u[1]]);
         let [p0, p1, p2] = self.mesh.corners(triangle as u32);
         let (e1, e2) = (p1 - p0, p2 - p0);
@@ -66,13 +53,9 @@ impl Emit for MeshLight {
         self.radiance.mean() * (PI / self.inverse_area)
     }
 
-    fn largest(&self) -> f32 {
-        self.radiance.largest()
-    }
-
     #[inline(always)]
-    fn radiance(&self, uv: Vec2) -> Rgb {
-        self.radiance.at(|| uv)
+    fn surface(&self) -> Option<&Varying> {
+        Some(&self.radiance)
     }
 
     #[inline(always)]

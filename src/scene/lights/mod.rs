@@ -32,6 +32,7 @@ use super::{
     Profile, Rgb,
     description::{ShapeDescription, ShapeGeometry},
     parameters::Parameters,
+    textures::Varying,
 };
 use crate::math::offset_origin;
 
@@ -57,12 +58,14 @@ const SHORT_OF_LIGHT: f32 = 0.9999;
 trait Emit {
     /// Emitted power in W, up to the unit of the scene, per channel; `scene_radius` is that of a sphere around it.
     fn power(&self, scene_radius: f32) -> Rgb;
-    /// The largest channel of any radiance, intensity or irradiance it can show.
-    fn largest(&self) -> f32;
-    /// Radiance of the place with those surface coordinates, of what rays can hit.
+    /// Radiance over its surface, of what rays can hit.
     #[inline(always)]
-    fn radiance(&self, _uv: Vec2) -> Rgb {
-        Rgb::ZERO
+    fn surface(&self) -> Option<&Varying> {
+        None
+    }
+    /// The largest channel of any radiance, intensity or irradiance it can show.
+    fn largest(&self) -> f32 {
+        self.surface().map_or(0.0, Varying::largest)
     }
     /// Samples a direction to it from the surface point `p` with geometric normal `ng`, whose length says how far to leave
     /// the surface (see [`lift`](crate::math::lift)); `None` where the chosen place does not shine to `p`.
@@ -105,11 +108,12 @@ macro_rules! registry {
             /// Radiance of the place with those surface coordinates, of a surface.
             #[inline(always)]
             pub fn radiance<P: Profile>(&self, uv: Vec2) -> Rgb {
-                match self {
-                    Light::MeshLight(light) => light.radiance(uv),
+                let surface = match self {
+                    Light::MeshLight(light) => light.surface(),
                     _ if P::FLAT_MESHES => unreachable!("a profile with lights on flat meshes only"),
-                    $(Light::$kind(light) => light.radiance(uv)),+
-                }
+                    $(Light::$kind(light) => light.surface()),+
+                };
+                surface.map_or(Rgb::ZERO, |radiance| radiance.at(|| uv))
             }
 
             /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with
@@ -162,13 +166,14 @@ impl Light {
         matches!(self, Light::Constant(_) | Light::Envmap(_))
     }
 
-    /// Radiance that comes from the direction `d`, of a light that [surrounds](Light::is_surrounding) the scene.
+    /// Radiance that comes from the direction `d`, and the density of sampling that direction, of a light that
+    /// [surrounds](Light::is_surrounding) the scene.
     #[inline]
-    pub fn radiance_from(&self, d: Vec3) -> Rgb {
+    pub fn surrounding(&self, d: Vec3) -> (Rgb, f32) {
         match self {
-            Light::Constant(light) => light.radiance,
-            Light::Envmap(light) => light.radiance_from(d),
-            _ => Rgb::ZERO,
+            Light::Constant(light) => (light.radiance, light.pdf(Vec3::ZERO, d, d)),
+            Light::Envmap(light) => light.surrounding(d),
+            _ => (Rgb::ZERO, 0.0),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Range, Scatter, ScatterSample, VaryingParameter};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter};
 use crate::{
     math::warp,
     scene::{Rgb, parameters::Parameters},
@@ -16,7 +16,7 @@ pub struct Diffuse {
 }
 
 impl Scatter for Diffuse {
-    const VARYING: &'static [VaryingParameter] = &[VaryingParameter { name: "reflectance", range: Range::Reflectance }];
+    const VARYING: &'static [VaryingParameter] = &[VaryingParameter::reflectance("reflectance")];
 
     #[inline]
     fn put(&mut self, _reflectance: usize, value: Rgb) {

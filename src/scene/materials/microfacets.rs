@@ -36,13 +36,9 @@ pub(super) const LEAST_ALPHA: f32 = 1e-4;
 impl Microfacets {
     pub fn read(p: &mut dyn Parameters) -> Microfacets {
         p.boolean("sample_visible");
-        let shape = match p.string("distribution").as_deref() {
-            None | Some("beckmann") => FacetShape::Beckmann,
-            Some("ggx") => FacetShape::Ggx,
-            Some(other) => {
-                p.fault("distribution", format!("unknown distribution \"{other}\"; known: beckmann, ggx"));
-                FacetShape::Beckmann
-            }
+        let shape = match p.word("distribution", &["beckmann", "ggx"]) {
+            None | Some(0) => FacetShape::Beckmann,
+            Some(_) => FacetShape::Ggx,
         };
         let mut roughness = |name: &str| {
             let value = p.float(name)?;

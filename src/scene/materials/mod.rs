@@ -40,7 +40,10 @@ pub use roughdielectric::RoughDielectric;
 pub use roughplastic::RoughPlastic;
 pub use thindielectric::ThinDielectric;
 
-use super::{Rgb, parameters::Parameters};
+use super::{
+    Rgb,
+    parameters::{Parameters, VaryingParameter},
+};
 
 /// One sampled direction.
 #[derive(Clone, Copy, Debug)]
@@ -135,56 +138,6 @@ impl Lobes {
     /// Whether light passes through.
     pub fn transmit(self) -> bool {
         self.smooth_transmission || self.delta_transmission || self.straight
-    }
-}
-
-/// A parameter in whose place a texture can be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct VaryingParameter {
-    /// Its name.
-    pub name: &'static str,
-    /// What values it takes.
-    pub range: Range,
-}
-
-impl VaryingParameter {
-    /// A colour with channels within 0…1.
-    pub const fn reflectance(name: &'static str) -> VaryingParameter {
-        VaryingParameter { name, range: Range::Reflectance }
-    }
-
-    /// A number within 0…1.
-    pub const fn fraction(name: &'static str) -> VaryingParameter {
-        VaryingParameter { name, range: Range::Fraction }
-    }
-
-    /// A number that is not negative.
-    pub const fn roughness(name: &'static str) -> VaryingParameter {
-        VaryingParameter { name, range: Range::Roughness }
-    }
-}
-
-/// What values a parameter takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Range {
-    /// Colours with channels within 0…1.
-    Reflectance,
-    /// Numbers within 0…1; of a texture, its luminance.
-    Fraction,
-    /// Numbers that are not negative; of a texture, its luminance.
-    Roughness,
-    /// Colours with channels that are not negative.
-    Radiance,
-}
-
-impl Range {
-    /// Whether values from `least` to `largest` are within; in words, what would be, where they are not.
-    pub fn check(self, [least, largest]: [f32; 2]) -> Result<(), &'static str> {
-        let (is_within, accepted) = match self {
-            Range::Reflectance | Range::Fraction => (least >= 0.0 && largest <= 1.0, "0 to 1"),
-            Range::Roughness | Range::Radiance => (least >= 0.0, "not negative"),
-        };
-        if is_within { Ok(()) } else { Err(accepted) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Range, Scatter, ScatterSample, VaryingParameter, burley};
+use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, burley};
 use crate::math::warp;
 use crate::scene::{Rgb, parameters::Parameters};
 
@@ -25,10 +25,8 @@ pub struct PrincipledThin {
 }
 
 impl Scatter for PrincipledThin {
-    const VARYING: &'static [VaryingParameter] = &[
-        VaryingParameter { name: "base_color", range: Range::Reflectance },
-        VaryingParameter { name: "roughness", range: Range::Fraction },
-    ];
+    const VARYING: &'static [VaryingParameter] =
+        &[VaryingParameter::reflectance("base_color"), VaryingParameter::fraction("roughness")];
 
     #[inline]
     fn put(&mut self, parameter: usize, value: Rgb) {

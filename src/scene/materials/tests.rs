@@ -196,6 +196,9 @@ impl Parameters for Bag {
     fn string(&mut self, _name: &str) -> Option<String> {
         None
     }
+    fn word(&mut self, _name: &str, _known: &[&str]) -> Option<usize> {
+        None
+    }
     fn rgb(&mut self, name: &str) -> Option<Rgb> {
         self.float(name).map(Rgb::splat)
     }

@@ -22,6 +22,9 @@ pub struct Bitmap {
     to_uv: Affine2,
     filter: Filter,
     wrap: Wrap,
+    /// Of all texels: every user of the texture asks.
+    mean: Rgb,
+    range: [f32; 2],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,10 +74,20 @@ impl Bitmap {
         (texels, from_centre - corner)
     }
 
-    /// All texels.
-    fn texels(&self) -> impl Iterator<Item = Rgb> {
+    /// With mean and range of its texels.
+    fn measured(mut self) -> Bitmap {
         let (width, height) = (self.image.width as i32, self.image.height as i32);
-        (0..height).flat_map(move |y| (0..width).map(move |x| self.texel(x, y)))
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let mut sum = glam::DVec3::ZERO;
+        let [mut low, mut high] = [f32::INFINITY, f32::NEG_INFINITY];
+        for (x, y) in texels {
+            let texel = self.texel(x, y);
+            sum += texel.as_dvec3();
+            [low, high] = [low.min(texel.min_element()), high.max(texel.max_element())];
+        }
+        self.mean = (sum / (f64::from(width) * f64::from(height))).as_vec3();
+        self.range = [low, high];
+        self
     }
 }
 
@@ -123,27 +136,27 @@ impl Vary for Bitmap {
     }
 
     fn mean(&self) -> Rgb {
-        let count = f64::from(self.image.width) * f64::from(self.image.height);
-        (self.texels().map(|t| t.as_dvec3()).sum::<glam::DVec3>() / count).as_vec3()
+        self.mean
     }
 
     fn range(&self) -> [f32; 2] {
-        self.texels().fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], t| {
-            [low.min(t.min_element()), high.max(t.max_element())]
-        })
+        self.range
     }
 
     fn read(p: &mut dyn Parameters) -> Option<Bitmap> {
         let image = p.image("filename");
         let raw = p.boolean("raw").unwrap_or(false);
-        let filters = [("bilinear", Filter::Bilinear), ("nearest", Filter::Nearest)];
-        let filter = choice(p, "filter_type", &filters).unwrap_or(Filter::Bilinear);
-        let wraps = [("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror), ("clamp", Wrap::Clamp)];
-        let wrap = choice(p, "wrap_mode", &wraps).unwrap_or(Wrap::Repeat);
+        let filter = match p.word("filter_type", &["bilinear", "nearest"]) {
+            None | Some(0) => Filter::Bilinear,
+            Some(_) => Filter::Nearest,
+        };
+        let wrap =
+            [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][p.word("wrap_mode", &["repeat", "mirror", "clamp"]).unwrap_or(0)];
         let to_uv = p.to_uv();
         let decode = |c: f64| if raw { c as f32 } else { linear_of_srgb(c) as f32 };
         let decoded = Arc::new(std::array::from_fn(|byte| decode(byte as f64 / 255.0)));
-        Some(Bitmap { image: unpacked(image?, decode), decoded, to_uv, filter, wrap })
+        let image = unpacked(image?, decode);
+        Some(Bitmap { image, decoded, to_uv, filter, wrap, mean: Rgb::ZERO, range: [0.0; 2] }.measured())
     }
 }
 
@@ -154,24 +167,14 @@ fn unpacked(image: Arc<Image>, decode: impl Fn(f64) -> f32) -> Arc<Image> {
     Arc::new(Image { width: image.width, height: image.height, texels: Texels::Floats(texels) })
 }
 
-/// A word among those known.
-fn choice<T: Copy>(p: &mut dyn Parameters, name: &str, known: &[(&str, T)]) -> Option<T> {
-    let given = p.string(name)?;
-    let found = known.iter().find(|(word, _)| *word == given).map(|(_, value)| *value);
-    if found.is_none() {
-        let words: Vec<_> = known.iter().map(|(word, _)| *word).collect();
-        p.fault(name, format!("unknown {name} {given:?}; known: {}", words.join(", ")));
-    }
-    found
-}
-
 #[cfg(test)]
 impl Bitmap {
     /// A linear picture with texels between which it is bilinear, repeated.
     pub fn of_texels(width: u32, height: u32, texels: Vec<[f32; 3]>) -> Bitmap {
         let image = Arc::new(Image { width, height, texels: Texels::Floats(texels) });
         let (to_uv, filter, wrap) = (Affine2::IDENTITY, Filter::Bilinear, Wrap::Repeat);
-        Bitmap { image, decoded: Arc::new([0.0; 256]), to_uv, filter, wrap }
+        Bitmap { image, decoded: Arc::new([0.0; 256]), to_uv, filter, wrap, mean: Rgb::ZERO, range: [0.0; 2] }
+            .measured()
     }
 }
 
@@ -213,7 +216,8 @@ mod tests {
     fn four(filter: Filter, wrap: Wrap, to_uv: Affine2) -> Bitmap {
         let texels = Texels::Floats([0.0, 1.0, 2.0, 4.0].map(|v| [v; 3]).to_vec());
         let decoded = Arc::new([0.0; 256]);
-        Bitmap { image: Arc::new(Image { width: 2, height: 2, texels }), decoded, to_uv, filter, wrap }
+        let image = Arc::new(Image { width: 2, height: 2, texels });
+        Bitmap { image, decoded, to_uv, filter, wrap, mean: Rgb::ZERO, range: [0.0; 2] }.measured()
     }
 
     #[test]

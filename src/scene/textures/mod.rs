@@ -18,6 +18,7 @@ pub use checkerboard::Checkerboard;
 pub use image::{Image, Texels};
 
 use super::{Rgb, parameters::Parameters};
+use crate::film::image::RELATIVE_LUMINANCE;
 
 /// A kind of texture.
 trait Vary: Sized {
@@ -53,11 +54,6 @@ macro_rules! registry {
         }
 
         impl Texture {
-            /// The name of its kind.
-            pub fn name(&self) -> &'static str {
-                match self { $(Texture::$kind(_) => $name),+ }
-            }
-
             /// Its value at the surface coordinates `uv`.
             #[inline]
             pub fn at(&self, uv: Vec2) -> Rgb {
@@ -88,13 +84,13 @@ registry! {
     "checkerboard" => Checkerboard,
 }
 
-/// The number that a colour stands for where a texture takes the place of one: its luminance, of Rec. 709.
+/// The number that a colour stands for where a texture takes the place of one: its relative luminance.
 #[inline]
 pub fn scalar(value: Rgb) -> f32 {
     if value.x == value.y && value.y == value.z {
         return value.x; // the weights sum to one but for rounding
     }
-    0.212_671 * value.x + 0.715_16 * value.y + 0.072_169 * value.z
+    value.dot(Rgb::from(RELATIVE_LUMINANCE))
 }
 
 /// A colour that is the same everywhere or varies.
