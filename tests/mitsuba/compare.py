@@ -6,6 +6,7 @@ Needs `pip install mitsuba` (3.9.1; variant scalar_rgb, as LLVM 14 and 15 do not
 `cargo test` needs none of this: it reads the references that are stored beside the scenes.
 
     compare.py reference [NAME...] [--samples N]   renders NAME.xml to NAME.exr (all scenes without a name)
+    compare.py reference veach-door --samples 131072   the same for a scene of others, see OTHERS below
     compare.py scattering                          evaluates the bsdfs of scattering.xml into scattering.csv
     compare.py check [NAME...] [--relt PROGRAM]    renders with relt, prints how far it is from the references
 
@@ -25,6 +26,7 @@ times cosine, of radiance) and `pdf` say; `wo` leads to the eye and `wi` to the 
 """
 
 import argparse
+import os
 import pathlib
 import re
 import subprocess
@@ -48,18 +50,21 @@ FILTERS = {
     "lanczos": {"type": "lanczos"},
 }
 PIXELS = r'(name="(?:crop_)?(?:width|height|offset_[xy])" value=)"(\d+)"'
+# Scenes of others are no part of the repository; their references are of 32 × 18 pixels.
+OTHERS = pathlib.Path(os.environ.get("RELT_SCENES", HERE.parents[2] / "shared/scenes"))
 SURFACE_ONLY = {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
 
 
 def reference(name, samples):
-    text = (HERE / f"{name}.xml").read_text()
+    own = HERE / f"{name}.xml"
+    text = own.read_text() if own.exists() else None
     kernel = FILTERS.get(name)
     if kernel:
         text = re.sub(PIXELS, lambda found: f'{found[1]}"{int(found[2]) * FINE}"', text)
         text = re.sub(r'<rfilter type="\w+"(/>|>.*</rfilter>)', '<rfilter type="box"/>', text)
         samples //= FINE * FINE
     mi.file_resolver().append(str(HERE))
-    scene = mi.load_string(text)
+    scene = mi.load_string(text) if text else mi.load_file(str(OTHERS / name / "scene.xml"), resx=32, resy=18)
     integrator = mi.load_dict(SURFACE_ONLY) if name == "smooth-emitter-light" else scene.integrator()
     passes = []
     for seed in range(PASSES):

@@ -109,6 +109,18 @@ fn veachs_plates_agree_with_their_reference() {
     }
 }
 
+/// A room lit through a door that is ajar, with pictures on all walls. The reference is by `tests/mitsuba/compare.py`.
+#[test]
+fn veachs_door_agrees_with_mitsuba() {
+    if let Some((scene, _)) = scene_of_others("veach-door", [32, 18]) {
+        let expected = Expected::read(&repository("tests/mitsuba/veach-door.exr"));
+        let settings = settings(Method::Path, 256.0, 0);
+        let filter = scene.film.filter;
+        Agreement { name: "reference-veach-door", tiles: [8, 3], precision: 0.02, filter }
+            .check(&runs(&scene, &settings, RUNS), &expected);
+    }
+}
+
 /// A lamp in its shade, a glass egg, rough metal.
 #[test]
 fn veachs_room_agrees_with_its_reference() {
