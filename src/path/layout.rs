@@ -6,8 +6,8 @@ use crate::scene::{Features, description::Integrator};
 /// decision and no other.
 ///
 /// Block 0 is the film position and, where there is a lens, the place on it: a block has four dimensions whether they are
-/// used or not, so neither costs anything more. Each bounce has one block (direction: 2, place on a light: 2) and, only where the
-/// scene needs any of them, a second one (lobe, light, roulette).
+/// used or not, so neither costs anything more. Each bounce has one block (direction: 2, place on a light: 2) and, only
+/// where the scene needs any of them, a second one (lobe, light, roulette).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Bounces choose among lobes or lights.
