@@ -9,5 +9,5 @@ pub mod scalar;
 pub mod unidirectional;
 mod vertex;
 
-pub use contribution::{Contribution, Contributions, luminance};
+pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Whole, luminance};
 pub use layout::Layout;
