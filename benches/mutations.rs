@@ -24,7 +24,7 @@ use criterion::{
 };
 use relt::embree::{Hits, Rays, Width};
 use relt::film::Footprint;
-use relt::path::unidirectional::{Mapping, Widths};
+use relt::path::{Mapping, MappingKind, Widths};
 use relt::render::calibration::{LANES, record_rays};
 use relt::render::engine::{Engine, Stage};
 use relt::render::{self, LadderChoice, Method, MltSettings, Normalisation, Settings};
@@ -125,7 +125,7 @@ fn runs() -> Vec<Run> {
 impl Run {
     fn measure(&mut self, bencher: &mut Bencher, scene: &Scene, widths: Widths) {
         let stage = Stage {
-            mapping: Mapping::new(scene, widths),
+            mapping: Mapping::new(scene, MappingKind::Unidirectional, widths),
             footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
             rng: Rng::new(self.settings.seed),
         };

@@ -21,8 +21,8 @@ use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_gr
 use relt::chain::{Evaluator, Recorder, Start, Target, Walkers, replay, resample};
 use relt::embree::Hits;
 use relt::film::{Accumulator, Footprint, Splats};
-use relt::path::unidirectional::{Mapping, Workspace};
 use relt::path::{Contribution, Contributions};
+use relt::path::{Mapping, Workspace};
 use relt::render::calibration::{LANES, record_rays};
 use relt::rng::{Counter, Purpose, Rng, open_unit_f64};
 use relt::sample::{Move, Points, Proposals, StepLaw};

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use relt::embree::Device;
-use relt::path::unidirectional::Widths;
+use relt::path::Widths;
 use relt::render::calibration::calibrate;
 use relt::scene::{Scene, SceneDescription};
 

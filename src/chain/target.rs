@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Importance;
 use crate::{
-    path::{Contributions, unidirectional},
+    path::{Contributions, Mapping, Workspace},
     rng::{Counter, Rng},
     sample::{Move, Points, Proposals},
 };
@@ -20,11 +20,11 @@ pub trait Target: Sync {
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace);
 }
 
-impl Target for unidirectional::Mapping<'_> {
-    type Workspace = unidirectional::Workspace;
+impl Target for Mapping<'_> {
+    type Workspace = Workspace;
 
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
-        unidirectional::Mapping::evaluate(self, proposals, out, workspace);
+        Mapping::evaluate(self, proposals, out, workspace);
     }
 }
 

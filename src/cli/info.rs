@@ -100,7 +100,7 @@ fn paths(features: &Features) -> Vec<String> {
         Some(edges) => format!("up to {edges} edges"),
         None => "of any length".into(),
     };
-    let roulette = match Layout::new(features).roulette_from() {
+    let roulette = match Layout::new(features, false).roulette_from() {
         Some(bounce) => format!("Russian roulette from bounce {} on", bounce + 1),
         None => "no Russian roulette".into(),
     };
@@ -161,7 +161,7 @@ fn materials(scene: &Scene) -> Vec<String> {
 
 /// Primary dimensions of the film position and, bounce by bounce, of the decisions there.
 fn dimensions(features: &Features) -> Vec<String> {
-    let layout = Layout::new(features);
+    let layout = Layout::new(features, false);
     let of_camera = layout.describe_camera();
     let mut lines =
         vec![runs(&of_camera).map(|run| format!("{}: {}", run[0], run.len())).collect::<Vec<_>>().join(", ")];

@@ -15,8 +15,8 @@ use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, Measure, Method, MltSettings, Normalisation, Observer, Output, PacketChoice,
-    Picture, RunStart, Settings, Status, Summary,
+    self, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer, Output,
+    PacketChoice, Picture, RunStart, Settings, Status, Summary,
 };
 use crate::tempering::RoundReport;
 
@@ -56,6 +56,12 @@ pub(super) struct Render {
     /// auto: as many as pay, none but the uniform one where path tracing is best [default: auto]
     #[arg(long, value_name = "K", value_parser = values::replicas, allow_hyphen_values = true, help_heading = "Method")]
     replicas: Option<LadderChoice>,
+
+    /// From random numbers to light paths; unidirectional: camera paths; light: light subpaths seen by the camera;
+    /// two-way: both; bidirectional: both, and every vertex of one joined to every vertex of the other; multiplexed: one of
+    /// those ways for each mutation; auto: a short trial on the scene decides
+    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = values::mapping(), help_heading = "Method")]
+    mapping: MappingChoice,
 
     /// Inverse temperatures for --method re in place of --replicas, rising from 0 to 1, such as 0,0.3,1
     #[arg(long, value_name = "0,…,1", value_delimiter = ',', allow_negative_numbers = true, help_heading = "Method")]
@@ -159,6 +165,7 @@ impl Render {
         let no_budget = self.mpp.is_none() && self.time.is_none();
         let settings = Settings {
             method: self.method,
+            mapping: self.mapping,
             seed: self.seed,
             threads: self.threads,
             pin: self.pin,

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::embree::Width;
-use crate::render::{Combine, LadderChoice, Measure, Method, Normalisation, PacketChoice};
+use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, Normalisation, PacketChoice};
 
 /// `name=value`.
 pub(super) fn define(text: &str) -> Result<(String, String), String> {
@@ -33,6 +33,10 @@ pub(super) fn interval(text: &str) -> Result<Duration, String> {
 
 pub(super) fn method() -> impl TypedValueParser<Value = Method> {
     one_of(&Method::ALL, |method| method.name())
+}
+
+pub(super) fn mapping() -> impl TypedValueParser<Value = MappingChoice> {
+    one_of(&MappingChoice::ALL, |mapping| mapping.name())
 }
 
 pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {

@@ -1,6 +1,9 @@
 //! Which primary dimensions decide what.
 
-use crate::scene::{Features, description::Integrator};
+use crate::{
+    sample::LIGHT_STREAM,
+    scene::{Features, description::Integrator},
+};
 
 /// The primary dimensions of a camera path, laid out by bounce so that a small step in one decision moves that
 /// decision and no other.
@@ -19,11 +22,12 @@ pub struct Layout {
     lens: bool,
     lobe_choice: bool,
     light_choice: bool,
+    technique_choice: bool,
 }
 
 impl Layout {
-    /// The layout for that scene.
-    pub fn new(features: &Features) -> Layout {
+    /// The layout for that scene; points choose a technique or have all of them.
+    pub fn new(features: &Features, technique_choice: bool) -> Layout {
         let max_depth =
             features.integrator.max_depth.map_or(Integrator::LONGEST, |d| d.min(Integrator::LONGEST)) as u16;
         Layout {
@@ -34,6 +38,7 @@ impl Layout {
             lens: features.lens,
             lobe_choice: features.lobe_choice,
             light_choice: features.light_choice(),
+            technique_choice,
         }
     }
 
@@ -60,6 +65,24 @@ impl Layout {
     #[inline(always)]
     pub fn roulette(&self, bounce: u16) -> bool {
         bounce >= self.roulette_from
+    }
+
+    /// The block of a light subpath that chooses the light and the technique, where there is any choice.
+    #[inline(always)]
+    pub fn light_choices(&self) -> Option<u16> {
+        (self.light_choice || self.technique_choice).then_some(LIGHT_STREAM)
+    }
+
+    /// The block of a light subpath that says where it starts and in which direction.
+    #[inline(always)]
+    pub fn emission(&self) -> u16 {
+        LIGHT_STREAM + u16::from(self.light_choices().is_some())
+    }
+
+    /// The block of a bounce of a light subpath, counted from 0.
+    #[inline(always)]
+    pub fn light_bounce(&self, bounce: u16) -> u16 {
+        self.emission() + 1 + bounce
     }
 
     /// Names of the dimensions that decide something before the first bounce, for people.
@@ -107,6 +130,7 @@ mod tests {
                     lens: choices,
                     lobe_choice: choices,
                     light_choice: false,
+                    technique_choice: false,
                 };
                 let mut next = 1;
                 for bounce in 0..50 {

@@ -1,13 +1,18 @@
 //! From points of the unit cube to light paths and what they contribute.
 //!
-//! [`unidirectional`] is the batched mapping that renders; [`scalar`] says the same for one point at a time, to be
-//! read and tested against.
+//! [`Mapping`] evaluates batches: [`unidirectional`] camera paths, or [`bidirectional`] paths from both ends.
+//! [`scalar`] and [`bidirectional::scalar`] say the same for one point at a time, to be read and tested against.
 
+pub mod bidirectional;
 mod contribution;
 mod layout;
+mod mapping;
 pub mod scalar;
-pub mod unidirectional;
+mod tracing;
+mod unidirectional;
 mod vertex;
 
 pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Whole, luminance};
 pub use layout::Layout;
+pub use mapping::{Mapping, MappingKind, Workspace};
+pub use tracing::{RecordedRays, Widths};

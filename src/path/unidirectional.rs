@@ -4,38 +4,20 @@
 //! traced once a bounce.
 
 use super::{
-    Contribution, Contributions, Layout,
+    Contribution, Contributions, Mapping, Workspace,
+    tracing::Kind,
     vertex::{self, Carried, Decisions},
 };
 use crate::{
-    embree::{Hits, MISS, Rays, Width},
+    embree::{Hits, MISS, Rays},
     rng::unit_f32,
     sample::Proposals,
-    scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Rgb, Scene},
+    scene::{Profile, Rgb, Scene},
 };
-
-/// Packet widths by kind of ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Widths {
-    /// Of camera rays.
-    pub camera: Width,
-    /// Of rays after a bounce.
-    pub bounce: Width,
-    /// Of shadow rays.
-    pub shadow: Width,
-}
-
-/// The mapping of one scene.
-pub struct Mapping<'s> {
-    scene: &'s Scene,
-    layout: Layout,
-    widths: Widths,
-    kernel: fn(&Mapping, &mut Proposals, &mut Contributions, &mut Workspace),
-}
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
 #[derive(Default)]
-pub struct Workspace {
+pub(super) struct Arrays {
     /// Lanes whose paths are alive, in step with `rays` and `carried`.
     lanes: Vec<u32>,
     rays: Rays,
@@ -51,138 +33,43 @@ pub struct Workspace {
     shadow_rays: Rays,
     shadow_contributions: Vec<Rgb>,
     occluded: Vec<bool>,
-    /// Rays of every kind as they are traced, where somebody asked for them.
-    recording: Option<RecordedRays>,
-    /// Answers that take the place of tracing, where somebody gave them.
-    replay: Option<Replay>,
-}
-
-/// The rays of some evaluations, batch by batch, for measuring Embree alone, and what came of them, for measuring all
-/// but Embree.
-#[derive(Default)]
-pub struct RecordedRays {
-    /// Camera rays.
-    pub camera: Vec<Rays>,
-    /// Rays after a bounce.
-    pub bounce: Vec<Rays>,
-    /// Shadow rays.
-    pub shadow: Vec<Rays>,
-    /// Hits of camera rays and of those after a bounce, in the order in which they were traced.
-    pub hits: Vec<Hits>,
-    /// Whether something was in the way of shadow rays, in that order.
-    pub occluded: Vec<Vec<bool>>,
-}
-
-/// Recorded answers, given again in the order in which they were recorded, round and round.
-struct Replay {
-    recorded: RecordedRays,
-    next_hits: usize,
-    next_occluded: usize,
-}
-
-impl Workspace {
-    /// A workspace that keeps a copy of every ray.
-    pub fn recording() -> Workspace {
-        Workspace { recording: Some(RecordedRays::default()), ..Workspace::default() }
-    }
-
-    /// A workspace that never asks Embree, but takes the answers recorded in evaluations of some points for those of the
-    /// same points in the same batches, as often as those are gone through.
-    pub fn replaying(recorded: RecordedRays) -> Workspace {
-        Workspace { replay: Some(Replay { recorded, next_hits: 0, next_occluded: 0 }), ..Workspace::default() }
-    }
-
-    /// The rays kept since the last call.
-    pub fn take_recorded(&mut self) -> RecordedRays {
-        self.recording.as_mut().map(std::mem::take).unwrap_or_default()
-    }
-}
-
-impl Replay {
-    fn closest(&mut self, rays: &Rays, hits: &mut Hits) {
-        let answers = &self.recorded.hits[self.next_hits];
-        debug_assert_eq!(rays.len(), answers.t.len(), "other points than those recorded");
-        hits.geometry.clone_from(&answers.geometry);
-        hits.primitive.clone_from(&answers.primitive);
-        hits.u.clone_from(&answers.u);
-        hits.v.clone_from(&answers.v);
-        hits.t.clone_from(&answers.t);
-        hits.instance.clone_from(&answers.instance);
-        self.next_hits = (self.next_hits + 1) % self.recorded.hits.len();
-    }
-
-    fn occluded(&mut self, rays: &Rays, occluded: &mut Vec<bool>) {
-        let answers = &self.recorded.occluded[self.next_occluded];
-        debug_assert_eq!(rays.len(), answers.len(), "other points than those recorded");
-        occluded.clone_from(answers);
-        self.next_occluded = (self.next_occluded + 1) % self.recorded.occluded.len();
-    }
-}
-
-impl<'s> Mapping<'s> {
-    /// The mapping of that scene, by the smallest kernel that does all it needs.
-    pub fn new(scene: &'s Scene, widths: Widths) -> Mapping<'s> {
-        Mapping::with_kernel(scene, widths, scene.features.kernel())
-    }
-
-    /// The mapping by a given kernel, which must do all that the scene needs.
-    pub fn with_kernel(scene: &'s Scene, widths: Widths, kernel: Kernel) -> Mapping<'s> {
-        assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
-        let kernel = match kernel {
-            Kernel::Diffuse => evaluate::<DiffuseProfile>,
-            Kernel::Plain => evaluate::<PlainProfile>,
-            Kernel::Full => evaluate::<FullProfile>,
-        };
-        Mapping { scene, layout: Layout::new(&scene.features), widths, kernel }
-    }
-
-    /// The scene.
-    pub fn scene(&self) -> &'s Scene {
-        self.scene
-    }
-
-    /// What the primary dimensions decide.
-    pub fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    /// Evaluates the proposals of all lanes that do not rest.
-    pub fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
-        (self.kernel)(self, proposals, out, workspace);
-    }
 }
 
 /// One batch, from primary samples to contributions.
-fn evaluate<P: Profile>(
+pub(super) fn evaluate<P: Profile>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    start_at_camera(mapping, proposals, workspace);
-    let last = mapping.layout.max_depth() - 1;
+    let Workspace { tracing, unidirectional: w, .. } = workspace;
+    let (scene, widths) = (mapping.scene(), mapping.widths());
+    start_at_camera(mapping, proposals, w);
+    let last = mapping.layout().max_depth() - 1;
     for bounce in 0..=last {
-        if workspace.lanes.is_empty() {
+        if w.lanes.is_empty() {
             break;
         }
-        trace(mapping, bounce, workspace, out);
+        let kind = if bounce == 0 { Kind::Camera } else { Kind::Bounce };
+        tracing.closest(scene, widths, kind, &w.rays, &mut w.hits, out);
         if bounce == last {
-            collect_emission::<P>(mapping.scene, workspace);
+            collect_emission::<P>(scene, w);
             break;
         }
-        keep_hits::<P>(mapping.scene, workspace);
-        proposals.draw(mapping.layout.bounce(bounce), &workspace.hit_lanes);
-        if let Some(block) = mapping.layout.choices(bounce) {
-            proposals.draw(block, &workspace.hit_lanes);
+        keep_hits::<P>(scene, w);
+        proposals.draw(mapping.layout().bounce(bounce), &w.hit_lanes);
+        if let Some(block) = mapping.layout().choices(bounce) {
+            proposals.draw(block, &w.hit_lanes);
         }
-        shade::<P>(mapping, bounce, proposals, workspace);
-        connect(mapping, workspace, out);
+        shade::<P>(mapping, bounce, proposals, w);
+        tracing.occluded(scene, widths, &w.shadow_rays, &mut w.occluded, out);
+        connect(w);
     }
-    settle(proposals, workspace, out);
+    settle(proposals, w, out);
 }
 
 /// Draws film positions and places on the lens, and starts a path in every lane that does not rest.
-fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Workspace) {
+fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Arrays) {
     proposals.begin(&mut w.lanes);
     proposals.draw(0, &w.lanes);
     w.rays.clear();
@@ -192,29 +79,15 @@ fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Workspa
     w.film.resize(proposals.lanes(), [0.0; 2]);
     for &lane in &w.lanes {
         let [x, y, u, v] = proposals.block(0, lane as usize).map(unit_f32);
-        let ray = mapping.scene.camera.ray([x, y], [u, v]);
+        let ray = mapping.scene().camera.ray([x, y], [u, v]);
         w.film[lane as usize] = [x, y];
         w.rays.push(ray.origin, ray.direction, ray.tfar);
         w.carried.push(Carried::START);
     }
 }
 
-/// Finds the closest hits of all live rays.
-fn trace(mapping: &Mapping, bounce: u16, w: &mut Workspace, out: &mut Contributions) {
-    let width = if bounce == 0 { mapping.widths.camera } else { mapping.widths.bounce };
-    match &mut w.replay {
-        None => mapping.scene.tracer.closest(width, &w.rays, &mut w.hits),
-        Some(replay) => replay.closest(&w.rays, &mut w.hits),
-    }
-    out.rays += w.rays.len() as u64;
-    if let Some(recording) = &mut w.recording {
-        (if bounce == 0 { &mut recording.camera } else { &mut recording.bounce }).push(w.rays.clone());
-        recording.hits.push(w.hits.clone());
-    }
-}
-
 /// Adds the background to the paths that left the scene and lists the others.
-fn keep_hits<P: Profile>(scene: &Scene, w: &mut Workspace) {
+fn keep_hits<P: Profile>(scene: &Scene, w: &mut Arrays) {
     w.hit_slots.clear();
     w.hit_lanes.clear();
     for i in 0..w.lanes.len() {
@@ -230,8 +103,8 @@ fn keep_hits<P: Profile>(scene: &Scene, w: &mut Workspace) {
 
 /// At every hit: emission, a light to connect to, and the next edge. The edges of the paths that go on replace the
 /// ones that led here.
-fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &mut Workspace) {
-    let (scene, layout) = (mapping.scene, &mapping.layout);
+fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &mut Arrays) {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
     let (first, choices) = (layout.bounce(bounce), layout.choices(bounce));
     w.shadow_lanes.clear();
     w.shadow_rays.clear();
@@ -264,17 +137,8 @@ fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &
     w.rays.truncate(kept);
 }
 
-/// Traces the shadow rays and adds the lights that are seen.
-fn connect(mapping: &Mapping, w: &mut Workspace, out: &mut Contributions) {
-    match &mut w.replay {
-        None => mapping.scene.tracer.occluded(mapping.widths.shadow, &w.shadow_rays, &mut w.occluded),
-        Some(replay) => replay.occluded(&w.shadow_rays, &mut w.occluded),
-    }
-    out.rays += w.shadow_rays.len() as u64;
-    if let Some(recording) = &mut w.recording {
-        recording.shadow.push(w.shadow_rays.clone());
-        recording.occluded.push(w.occluded.clone());
-    }
+/// Adds the lights that are seen.
+fn connect(w: &mut Arrays) {
     for ((&lane, &contribution), &occluded) in w.shadow_lanes.iter().zip(&w.shadow_contributions).zip(&w.occluded) {
         if !occluded {
             w.radiance[lane as usize] += contribution;
@@ -283,7 +147,7 @@ fn connect(mapping: &Mapping, w: &mut Workspace, out: &mut Contributions) {
 }
 
 /// Emission and background at the end of the longest paths, where nothing follows.
-fn collect_emission<P: Profile>(scene: &Scene, w: &mut Workspace) {
+fn collect_emission<P: Profile>(scene: &Scene, w: &mut Arrays) {
     for i in 0..w.lanes.len() {
         let (origin, direction, carried) = (w.rays.origin(i), w.rays.direction(i), &w.carried[i]);
         w.radiance[w.lanes[i] as usize] += match w.hits.get(i) {
@@ -294,7 +158,7 @@ fn collect_emission<P: Profile>(scene: &Scene, w: &mut Workspace) {
 }
 
 /// Turns radiances into contributions and settles those that are not finite.
-fn settle(proposals: &Proposals, w: &Workspace, out: &mut Contributions) {
+fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != crate::sample::Move::Rest {
             let (contribution, fault) = Contribution::settle(w.film[lane], w.radiance[lane]);

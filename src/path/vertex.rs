@@ -49,11 +49,11 @@ pub(super) struct Edge {
 /// The primary samples of one bounce.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Decisions {
-    direction: [f32; 2],
-    light_place: [f32; 2],
-    lobe: f32,
-    light: f32,
-    roulette: Option<f32>,
+    pub direction: [f32; 2],
+    pub light_place: [f32; 2],
+    pub lobe: f32,
+    pub light: f32,
+    pub roulette: Option<f32>,
 }
 
 impl Decisions {
@@ -68,6 +68,25 @@ impl Decisions {
             light,
             roulette: layout.roulette(bounce).then_some(roulette),
         }
+    }
+
+    /// Of a bounce of a light subpath, with roulette or without.
+    #[inline(always)]
+    pub fn of_light(layout: &Layout, bounce: u16, block: Block, roulette: bool) -> Decisions {
+        let [a, b, lobe, survival] = block.map(unit_f32);
+        Decisions {
+            direction: [a, b],
+            light_place: [0.0; 2],
+            lobe,
+            light: 0.0,
+            roulette: (roulette && layout.roulette(bounce)).then_some(survival),
+        }
+    }
+
+    /// Plays no roulette.
+    #[inline(always)]
+    pub fn survive(&mut self) {
+        self.roulette = None;
     }
 }
 

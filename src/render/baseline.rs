@@ -11,7 +11,7 @@ use super::{
 use crate::{
     chain::{Baseline, Evaluator, LargeSteps, Plan, Start, baseline_layer, resample},
     film::{Accumulator, Plane, Splats},
-    path::unidirectional::Workspace,
+    path::Workspace,
     rng::{Counter, Purpose},
     sample::{Move, Points},
     tempering::Estimate,

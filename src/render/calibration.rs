@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::{
     chain::Evaluator,
     embree::{Hits, Rays, Width},
-    path::unidirectional::{Mapping, RecordedRays, Widths, Workspace},
+    path::{Mapping, MappingKind, RecordedRays, Widths, Workspace},
     rng::{Counter, Purpose, Rng},
     sample::{Move, Points},
     scene::Scene,
@@ -18,10 +18,10 @@ const BATCHES: u64 = 8;
 /// Each width's time is the least of this many repetitions.
 const REPETITIONS: usize = 3;
 
-/// The rays of `batches` batches of uniform points.
-pub fn record_rays(scene: &Scene, batches: u64) -> RecordedRays {
+/// The rays that a mapping makes of `batches` batches of uniform points.
+pub fn record_rays(scene: &Scene, kind: MappingKind, batches: u64) -> RecordedRays {
     let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
-    let mapping = Mapping::new(scene, widths);
+    let mapping = Mapping::new(scene, kind, widths);
     let counters = (0..LANES)
         .map(|lane| Counter { ladder: lane as u32, replica: 0, step: 0, purpose: Purpose::Primary })
         .collect();
@@ -35,10 +35,10 @@ pub fn record_rays(scene: &Scene, batches: u64) -> RecordedRays {
     evaluator.workspace().take_recorded()
 }
 
-/// The fastest width for each kind of ray of that scene, from a few thousand rays. Hits do not depend on it, so
+/// The fastest width for each kind of ray that a mapping of that scene has, from a few thousand rays. Hits do not depend on it, so
 /// neither does the image.
-pub fn calibrate(scene: &Scene) -> Widths {
-    let rays = record_rays(scene, BATCHES);
+pub fn calibrate(scene: &Scene, kind: MappingKind) -> Widths {
+    let rays = record_rays(scene, kind, BATCHES);
     let mut hits = Hits::default();
     let mut occluded = Vec::new();
     let mut closest = |batches: &[Rays]| {

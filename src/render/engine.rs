@@ -3,7 +3,7 @@
 use crate::{
     chain::Recorder,
     film::{Accumulator, Footprint, Image, Plane, Splats},
-    path::unidirectional::Mapping,
+    path::Mapping,
     rng::Rng,
     tempering::{Estimate, RoundReport},
 };

@@ -16,5 +16,7 @@ mod tests;
 
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};
-pub use settings::{Combine, LadderChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings};
+pub use settings::{
+    Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings,
+};
 pub use status::{Observer, RunStart, SetUp, Status, Stop, Summary};

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     film::Footprint,
-    path::unidirectional::Workspace,
+    path::Workspace,
     tempering::{Choices, LadderChoice, Learning, RoundReport, Sampler, Setup},
 };
 

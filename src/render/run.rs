@@ -15,12 +15,12 @@ use super::{
     engine::{Engine, Phase, Stage},
     output::{Picture, metadata},
     replica_exchange::ReplicaExchange,
-    settings::{Method, PacketChoice, Settings},
+    settings::{MappingChoice, Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
 };
 use crate::{
     film::Footprint,
-    path::unidirectional::{Mapping, Widths},
+    path::{Mapping, MappingKind, Widths},
     rng::Rng,
     scene::Scene,
     tempering::RoundReport,
@@ -74,13 +74,17 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
+    let kind = match job.settings.mapping {
+        MappingChoice::Auto => MappingKind::Unidirectional,
+        MappingChoice::Fixed(kind) => kind,
+    };
     let widths = match job.settings.packet {
-        PacketChoice::Auto => calibration::calibrate(job.scene),
+        PacketChoice::Auto => calibration::calibrate(job.scene, kind),
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
     };
     let film = job.scene.film;
     let stage = Stage {
-        mapping: Mapping::new(job.scene, widths),
+        mapping: Mapping::new(job.scene, kind, widths),
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(job.settings.seed),
     };
@@ -383,7 +387,11 @@ mod tests {
         let settings = Settings { mutations_per_pixel: None, ..Settings::default() };
         let job = Job { scene: &scene, scene_name: "box".into(), settings, stop: &AtomicBool::new(false) };
         let stage = Stage {
-            mapping: Mapping::new(&scene, Widths { camera: Width::W1, bounce: Width::W1, shadow: Width::W1 }),
+            mapping: Mapping::new(
+                &scene,
+                MappingKind::Unidirectional,
+                Widths { camera: Width::W1, bounce: Width::W1, shadow: Width::W1 },
+            ),
             footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
             rng: Rng::new(0),
         };

@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use crate::chain::LARGE_STEP_PROBABILITY;
 pub use crate::chain::Measure;
 use crate::embree::Width;
+use crate::path::MappingKind;
 pub use crate::tempering::{Choices, Combine, LadderChoice};
 
 /// How the image is estimated.
@@ -100,6 +101,43 @@ impl Default for MltSettings {
     }
 }
 
+/// How points of the cube become light paths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MappingChoice {
+    /// What a short trial on the scene finds best.
+    #[default]
+    Auto,
+    /// Always this one.
+    Fixed(MappingKind),
+}
+
+impl MappingChoice {
+    /// All of them.
+    pub const ALL: [MappingChoice; 1 + MappingKind::ALL.len()] = {
+        let mut all = [MappingChoice::Auto; 1 + MappingKind::ALL.len()];
+        let mut i = 0;
+        while i < MappingKind::ALL.len() {
+            all[i + 1] = MappingChoice::Fixed(MappingKind::ALL[i]);
+            i += 1;
+        }
+        all
+    };
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            MappingChoice::Auto => "auto",
+            MappingChoice::Fixed(kind) => kind.name(),
+        }
+    }
+}
+
+impl Serialize for MappingChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// How many rays go to Embree at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PacketChoice {
@@ -124,6 +162,8 @@ impl Serialize for PacketChoice {
 pub struct Settings {
     /// How the image is estimated.
     pub method: Method,
+    /// From primary samples to light paths.
+    pub mapping: MappingChoice,
     /// Of all random numbers; the same seed gives the same image for the same budget in mutations.
     pub seed: u64,
     /// Worker threads; as many as the machine runs at once where absent.
@@ -158,6 +198,7 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             method: Method::default(),
+            mapping: MappingChoice::default(),
             seed: 0,
             threads: None,
             pin: false,

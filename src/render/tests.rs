@@ -10,7 +10,7 @@ use super::{
 use crate::{
     embree::{Device, Width},
     film::{Footprint, Plane},
-    path::unidirectional::{Mapping, Widths},
+    path::{Mapping, MappingKind, Widths},
     rng::Rng,
     scene::Scene,
     tempering::Estimate,
@@ -57,7 +57,7 @@ fn scene(name: &str) -> Scene {
 fn stage(scene: &Scene) -> Stage<'_> {
     let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
     Stage {
-        mapping: Mapping::new(scene, widths),
+        mapping: Mapping::new(scene, MappingKind::Unidirectional, widths),
         footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
         rng: Rng::new(9),
     }

@@ -12,7 +12,7 @@ mod sobol;
 mod strata;
 
 pub use mutation::StepLaw;
-pub use points::Points;
+pub use points::{LIGHT_STREAM, Points};
 pub use proposals::{Move, Proposals};
 pub use strata::{PixelOrder, StratifiedPoints};
 

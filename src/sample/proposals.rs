@@ -24,7 +24,8 @@ pub enum Move {
 /// The proposals of one step of a batch.
 ///
 /// A target asks for block after block with [`draw`](Self::draw), for the lanes that still need it, and reads the
-/// words with [`block`](Self::block). Blocks must be drawn in rising order.
+/// words with [`block`](Self::block). Blocks of a
+/// stream must be drawn in rising order.
 pub struct Proposals<'a> {
     /// The source of random words.
     pub rng: Rng,
@@ -104,7 +105,7 @@ impl Proposals<'_> {
     #[inline(always)]
     fn set(&mut self, block: u16, lane: usize, words: Block) {
         let proposed = match self.moves[lane] {
-            Move::Small(law) if block < self.current.used(lane) => law.step(self.current.block(block, lane), words),
+            Move::Small(law) if self.current.has(block, lane) => law.step(self.current.block(block, lane), words),
             Move::Stratified if block == 0 => within_pixel(self.counters[lane].ladder, self.film, words),
             _ => words,
         };

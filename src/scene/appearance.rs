@@ -156,9 +156,8 @@ impl Appearance {
         self.parts.len() > 1 || self.parts.iter().any(|part| part.material.lobes().need_choice())
     }
 
-    /// The scattering function at a place of a surface with that shading frame and geometric normal, seen from `wo`; see
-    /// [`Relief::at`].
-    pub(super) fn at(&self, place: &Place, frame: &Frame, ng: Vec3, wo: Vec3) -> Mixture {
+    /// The scattering function at a place of a surface with that shading frame and geometric normal; see [`Relief::at`].
+    pub(super) fn at(&self, place: &Place, frame: &Frame, ng: Vec3) -> Mixture {
         let components = self.parts.iter().map(|part| {
             let mut material = part.material;
             for (parameter, texture) in &part.textures {
@@ -167,7 +166,7 @@ impl Appearance {
             Component {
                 share: part.shares.iter().map(|share| share.at(place)).product(),
                 material,
-                tilt: part.relief.as_ref().map(|relief| relief.at(place, frame, ng, wo)),
+                tilt: part.relief.as_ref().map(|relief| relief.at(place, frame, ng)),
             }
         });
         Mixture(components.filter(|component| component.share > 0.0).collect())
@@ -253,14 +252,52 @@ impl Mixture {
 const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 impl Scattering<'_> {
+    /// The same without owning it.
+    #[inline(always)]
+    pub fn by_reference(&self) -> ScatteringRef<'_> {
+        match self {
+            Scattering::Plain(material) => ScatteringRef::Plain(material),
+            Scattering::Mixed(mixture) => ScatteringRef::Mixed(mixture),
+        }
+    }
+
+    /// Whether some lobe has a finite density.
+    #[inline(always)]
+    pub fn is_smooth<P: Profile>(&self) -> bool {
+        self.by_reference().is_smooth::<P>()
+    }
+
+    /// See [`Scatter::sample`].
+    #[inline(always)]
+    pub fn sample<P: Profile>(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
+        self.by_reference().sample::<P>(wo, u, choice)
+    }
+
+    /// See [`Scatter::evaluate`].
+    #[inline(always)]
+    pub fn evaluate<P: Profile>(&self, wo: Vec3, wi: Vec3) -> Evaluation {
+        self.by_reference().evaluate::<P>(wo, wi)
+    }
+}
+
+/// A scattering function that somebody else keeps.
+#[derive(Clone, Copy, Debug)]
+pub enum ScatteringRef<'a> {
+    /// One that is the same everywhere.
+    Plain(&'a Material),
+    /// Any.
+    Mixed(&'a Mixture),
+}
+
+impl ScatteringRef<'_> {
     /// Whether some lobe has a finite density.
     #[inline(always)]
     pub fn is_smooth<P: Profile>(&self) -> bool {
         match self {
             _ if P::DIFFUSE => true,
-            Scattering::Plain(material) => material.lobes().smooth,
+            ScatteringRef::Plain(material) => material.lobes().smooth,
             _ if !P::VARYING => unreachable!("a profile without textures and mixtures"),
-            Scattering::Mixed(mixture) => mixture.0.iter().any(|component| component.material.lobes().smooth),
+            ScatteringRef::Mixed(mixture) => mixture.0.iter().any(|component| component.material.lobes().smooth),
         }
     }
 
@@ -268,11 +305,11 @@ impl Scattering<'_> {
     #[inline(always)]
     pub fn sample<P: Profile>(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
         match self {
-            Scattering::Plain(Material::Diffuse(diffuse)) => diffuse.sample(wo, u, choice),
+            ScatteringRef::Plain(Material::Diffuse(diffuse)) => diffuse.sample(wo, u, choice),
             _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-            Scattering::Plain(material) => material.sample(wo, u, choice),
+            ScatteringRef::Plain(material) => material.sample(wo, u, choice),
             _ if !P::VARYING => unreachable!("a profile without textures and mixtures"),
-            Scattering::Mixed(mixture) => mixture.sample(wo, u, choice),
+            ScatteringRef::Mixed(mixture) => mixture.sample(wo, u, choice),
         }
     }
 
@@ -280,11 +317,11 @@ impl Scattering<'_> {
     #[inline(always)]
     pub fn evaluate<P: Profile>(&self, wo: Vec3, wi: Vec3) -> Evaluation {
         match self {
-            Scattering::Plain(Material::Diffuse(diffuse)) => diffuse.evaluate(wo, wi),
+            ScatteringRef::Plain(Material::Diffuse(diffuse)) => diffuse.evaluate(wo, wi),
             _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-            Scattering::Plain(material) => material.evaluate(wo, wi),
+            ScatteringRef::Plain(material) => material.evaluate(wo, wi),
             _ if !P::VARYING => unreachable!("a profile without textures and mixtures"),
-            Scattering::Mixed(mixture) => mixture.evaluate(wo, wi),
+            ScatteringRef::Mixed(mixture) => mixture.evaluate(wo, wi),
         }
     }
 }
@@ -326,7 +363,7 @@ mod tests {
     }
 
     fn at(appearance: &Appearance, u: f32) -> Mixture {
-        appearance.at(&place(u, 0.5), &FRAME, Vec3::Z, Vec3::Z)
+        appearance.at(&place(u, 0.5), &FRAME, Vec3::Z)
     }
 
     /// Mean weight of samples over a grid: what is reflected of light from everywhere, and the part that goes straight on.

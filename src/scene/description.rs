@@ -41,8 +41,8 @@ pub struct Integrator {
 
 impl Integrator {
     /// Longest path in edges that primary dimensions can be numbered for. Also the limit where a scene sets none: with
-    /// survival of at most 0.95 a bounce, fewer than one path in 10⁷⁰⁰ would be longer.
-    pub const LONGEST: u32 = 32_000;
+    /// survival of at most 0.95 a bounce, fewer than one path in 10³⁵⁰ would be longer.
+    pub const LONGEST: u32 = 16_000;
 }
 
 /// Which extent of the film the field of view spans.

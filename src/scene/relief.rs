@@ -41,6 +41,8 @@ pub enum ReliefKind {
 pub(super) struct Tilt {
     /// The bent frame in coordinates of the one that it was bent from.
     frame: Frame,
+    /// The one that takes its place where it is turned away from the eye, if any.
+    turned: Option<Frame>,
     /// How fast light is attenuated towards grazing directions, as the square of a roughness.
     shadow: f32,
 }
@@ -51,9 +53,8 @@ impl Relief {
         &self.texture
     }
 
-    /// At a place of a surface with that shading frame and geometric normal, seen from the local direction `wo` (whose z
-    /// is that of the side where both sides are seen as fronts).
-    pub(super) fn at(&self, place: &Place, frame: &Frame, ng: Vec3, wo: Vec3) -> Tilt {
+    /// At a place of a surface with that shading frame and geometric normal.
+    pub(super) fn at(&self, place: &Place, frame: &Frame, ng: Vec3) -> Tilt {
         let (du, dv) = (frame.to_local(place.du), frame.to_local(place.dv));
         let n = match self.kind {
             ReliefKind::Heights { scale } => {
@@ -63,15 +64,14 @@ impl Relief {
             }
             ReliefKind::Normals => (2.0 * self.texture.at(place.uv) - Vec3::ONE).normalize_or(Vec3::Z),
         };
-        let is_turned_away = n.dot(wo) * wo.z < 0.0;
-        let n = if self.flip_invalid && is_turned_away { Vec3::new(-n.x, -n.y, n.z) } else { n };
-        let frame = match (du - n * n.dot(du)).try_normalize() {
+        let about = |n: Vec3| match (du - n * n.dot(du)).try_normalize() {
             Some(s) => Frame { s, t: n.cross(s), n },
             None => Frame::new(n),
         };
         let cos2 = (n.z * n.z).clamp(f32::MIN_POSITIVE, 1.0);
         let shadow = if self.shadowing { (SHADOW * (1.0 - cos2) / cos2).min(1.0) } else { 0.0 };
-        Tilt { frame, shadow }
+        let turned = self.flip_invalid.then(|| about(Vec3::new(-n.x, -n.y, n.z)));
+        Tilt { frame: about(n), turned, shadow }
     }
 }
 
@@ -80,6 +80,14 @@ impl Relief {
 const SHADOW: f32 = 0.125;
 
 impl Tilt {
+    /// The frame as seen from `wo` (whose z is that of the side where both sides are seen as fronts).
+    fn seen_from(&self, wo: Vec3) -> &Frame {
+        match &self.turned {
+            Some(turned) if self.frame.n.dot(wo) * wo.z < 0.0 => turned,
+            _ => &self.frame,
+        }
+    }
+
     /// The part of light from `w` that reaches bent normals: G₁ of GGX with the roughness that they stand for.
     fn lit(&self, w: Vec3) -> f32 {
         let cos2 = (w.z * w.z).clamp(1e-12, 1.0);
@@ -88,19 +96,21 @@ impl Tilt {
 
     /// Samples a material whose normal is bent; directions are in the frame as it was.
     pub fn sample(&self, material: &Material, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
-        let sample = material.sample(self.frame.to_local(wo), u, choice)?;
-        let wi = self.frame.to_world(sample.wi);
+        let frame = self.seen_from(wo);
+        let sample = material.sample(frame.to_local(wo), u, choice)?;
+        let wi = frame.to_world(sample.wi);
         // on the same side of the surface as of the bent one
         (wi.z * sample.wi.z > 0.0).then(|| ScatterSample { wi, weight: sample.weight * self.lit(wi), ..sample })
     }
 
     /// Value and density; directions are in the frame as it was.
     pub fn evaluate(&self, material: &Material, wo: Vec3, wi: Vec3) -> Evaluation {
-        let bent = self.frame.to_local(wi);
+        let frame = self.seen_from(wo);
+        let bent = frame.to_local(wi);
         if bent.z * wi.z <= 0.0 {
             return Evaluation::ZERO;
         }
-        let Evaluation { value, pdf } = material.evaluate(self.frame.to_local(wo), bent);
+        let Evaluation { value, pdf } = material.evaluate(frame.to_local(wo), bent);
         Evaluation { value: value * self.lit(wi), pdf }
     }
 }
@@ -133,7 +143,7 @@ mod tests {
     /// Values and densities of a diffuse material of reflectance 0.8 against Mitsuba 3.9.1's.
     fn check(relief: &Relief, place: &Place, frame: &Frame, ng: Vec3, wo: Vec3, expected: &[([f32; 3], f32)]) {
         let diffuse = Material::Diffuse(Diffuse { reflectance: Rgb::splat(0.8) });
-        let tilt = relief.at(place, frame, ng, wo);
+        let tilt = relief.at(place, frame, ng);
         for &(wi, value) in expected {
             let got = tilt.evaluate(&diffuse, wo, Vec3::from(wi).normalize()).value.x;
             assert!((got - value).abs() < 2e-5, "{:?} from {wo} to {wi:?}: {got} for {value}", relief.kind);
@@ -210,7 +220,7 @@ mod tests {
     #[test]
     fn flat_heights_bend_nothing() {
         let relief = relief(ReliefKind::Heights { scale: 5.0 }, true, true, Bitmap::of_texels(2, 2, vec![[0.4; 3]; 4]));
-        let tilt = relief.at(&PLACE, &FRAME, Vec3::Z, Vec3::Z);
+        let tilt = relief.at(&PLACE, &FRAME, Vec3::Z);
         assert_eq!(tilt.frame, FRAME);
         assert_eq!(tilt.lit(Vec3::new(0.9, 0.0, 0.1).normalize()), 1.0);
     }

@@ -152,6 +152,8 @@ pub struct Surface<'s> {
     pub uv: Vec2,
     /// The scattering function on the side of `wo`.
     pub scattering: Scattering<'s>,
+    /// Number of the appearance on that side.
+    pub appearance: u32,
     /// The light that this surface is, seen from its front; [`NO_LIGHT`] otherwise.
     pub light: u32,
 }
@@ -184,6 +186,7 @@ impl Scene {
             wo: frame.to_local(-direction),
             uv: Vec2::ZERO,
             scattering: Scattering::Plain(&self.materials[index]),
+            appearance: index as u32,
             light,
         }
     }
@@ -219,9 +222,9 @@ impl Scene {
         let appearance = &self.appearances[index];
         let scattering = match appearance.plain() {
             Some(_) => Scattering::Plain(&self.materials[index]),
-            None => Scattering::Mixed(appearance.at(&place, &unturned, ng, wo)),
+            None => Scattering::Mixed(appearance.at(&place, &unturned, ng)),
         };
-        Surface { p, ng, lift, frame, wo, uv: place.uv, scattering, light }
+        Surface { p, ng, lift, frame, wo, uv: place.uv, scattering, appearance: index as u32, light }
     }
 }
 

@@ -371,7 +371,7 @@ fn limits_of_path_length_are_checked() {
     let of = |name: &str, value: &str| {
         around(&format!("<integrator type='path'>\n<integer name='{name}' value='{value}'/></integrator>"))
     };
-    assert_faults(&of("max_depth", "-2"), &[], &["3:34: max_depth is -2; accepted: -1 (no limit) or 1 to 32000"]);
+    assert_faults(&of("max_depth", "-2"), &[], &["3:34: max_depth is -2; accepted: -1 (no limit) or 1 to 16000"]);
     assert_faults(&of("max_depth", "0"), &[], &["3:34: max_depth is 0; "]);
     assert_faults(&of("rr_depth", "0"), &[], &["3:33: rr_depth is 0; accepted: 1 and more"]);
     assert_faults(&of("max_depth", "1.5"), &[], &["3:34: \"1.5\" is not a whole number"]);

@@ -16,3 +16,4 @@ mod mitsuba;
 mod references;
 mod scattering;
 mod support;
+mod techniques;

@@ -1,11 +1,10 @@
-//! The batched mapping against the scalar one, to the bit.
+//! The batched mappings against the scalar ones, to the bit.
 
 use relt::chain::Evaluator;
 use relt::embree::Width;
-use relt::path::unidirectional::{Mapping, Workspace};
-use relt::path::{Contribution, Layout, scalar};
+use relt::path::{Contribution, Elsewhere, Mapping, MappingKind, Workspace, bidirectional, scalar};
 use relt::rng::{Counter, Purpose, Rng};
-use relt::sample::{Move, Points, Proposals, StepLaw};
+use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
 use relt::scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
 
 use crate::support::{OWN, fixed_widths, load, own, repository};
@@ -43,10 +42,24 @@ fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
     (c.film.map(f32::to_bits), c.rgb.to_array().map(f32::to_bits), c.ln_g.to_bits())
 }
 
+/// What the specification says of a lane.
+fn specified<P: Profile>(mapping: &Mapping, proposals: &mut Proposals, lane: usize) -> (Contribution, Elsewhere, u64) {
+    if mapping.kind() == MappingKind::Unidirectional {
+        let (contribution, fault) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
+        return (contribution, Elsewhere::new(1), u64::from(fault));
+    }
+    bidirectional::scalar::evaluate::<P>(mapping, proposals, lane)
+}
+
 /// All contributions and points that `STEPS` steps of the batch give, each compared with the scalar mapping.
-fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) -> Vec<Contribution> {
-    let mapping = Mapping::with_kernel(scene, fixed_widths(width), kernel);
-    let layout = Layout::new(&scene.features);
+fn compare<P: Profile>(
+    name: &str,
+    scene: &Scene,
+    kind: MappingKind,
+    kernel: Kernel,
+    width: Width,
+) -> Vec<Contribution> {
+    let mapping = Mapping::with_kernel(scene, kind, fixed_widths(width), kernel);
     let rng = Rng::new(7);
     let mut evaluator = Evaluator::<Workspace>::new(rng, counters(0));
     let mut current = Points::new(LANES);
@@ -71,14 +84,17 @@ fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) 
         }
         let mut lit = Vec::new();
         for lane in live.into_iter().map(|lane| lane as usize) {
-            let replay = format!("{name}, {kernel:?} kernel, width {width}, step {step}, lane {lane}");
-            let (expected, fault) = scalar::evaluate::<P>(scene, &layout, &mut proposals, lane);
+            let replay =
+                format!("{name}, {} mapping, {kernel:?} kernel, width {width}, step {step}, lane {lane}", kind.name());
+            let (expected, elsewhere, fault) = specified::<P>(&mapping, &mut proposals, lane);
             let got = evaluator.out.lanes[lane];
             assert_eq!(bits(&got), bits(&expected), "{replay}: {got:?} for {expected:?}");
-            faults += u64::from(fault);
+            let got_elsewhere = evaluator.out.elsewhere.of(lane);
+            assert_eq!(got_elsewhere, elsewhere.of(0), "{replay}: elsewhere");
+            faults += fault;
             let used = proposals.points.used(lane);
             assert_eq!(evaluator.points.used(lane), used, "{replay}: blocks");
-            for block in 0..used {
+            for block in (0..used[0]).chain(LIGHT_STREAM..LIGHT_STREAM + used[1]) {
                 assert_eq!(evaluator.points.block(block, lane), proposals.block(block, lane), "{replay}: {block}");
             }
             all.push(got);
@@ -95,7 +111,13 @@ fn compare<P: Profile>(name: &str, scene: &Scene, kernel: Kernel, width: Width) 
 }
 
 fn every_width<P: Profile>(name: &str, scene: &Scene, kernel: Kernel) -> Vec<Contribution> {
-    let mut of_widths = Width::ALL.map(|width| compare::<P>(name, scene, kernel, width)).into_iter();
+    for kind in MappingKind::ALL.into_iter().filter(|kind| *kind != MappingKind::Unidirectional) {
+        let points = compare::<P>(name, scene, kind, kernel, Width::W8);
+        let lit = points.iter().filter(|c| !c.is_dark()).count();
+        assert!(lit >= 10, "{name}, {}: only {lit} of {} points are lit", kind.name(), points.len());
+    }
+    let uni = MappingKind::Unidirectional;
+    let mut of_widths = Width::ALL.map(|width| compare::<P>(name, scene, uni, kernel, width)).into_iter();
     let first = of_widths.next().expect("there are widths");
     for other in of_widths {
         assert!(first.iter().zip(&other).all(|(a, b)| bits(a) == bits(b)), "{name}: widths differ");
@@ -151,7 +173,7 @@ fn the_small_kernel_is_chosen_where_it_is_enough() {
 fn replayed_hits_give_what_they_were_recorded_from() {
     for name in OWN {
         let scene = own(name, &[("res", "64")]);
-        let mapping = Mapping::new(&scene, fixed_widths(Width::W8));
+        let mapping = Mapping::new(&scene, MappingKind::Unidirectional, fixed_widths(Width::W8));
         let evaluate = |evaluator: &mut Evaluator<Workspace>, step| {
             evaluator.moves.fill(Move::Fresh);
             evaluator.counters = counters(step);

@@ -5,7 +5,7 @@ use std::sync::{OnceLock, atomic::AtomicBool};
 
 use relt::embree::{Device, Width};
 use relt::film::Image;
-use relt::path::unidirectional::Widths;
+use relt::path::Widths;
 use relt::render::{Job, Method, Observer, Outcome, PacketChoice, Settings, run};
 use relt::scene::Scene;
 

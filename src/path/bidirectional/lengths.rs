@@ -1,0 +1,88 @@
+//! Which technique a point of the multiplexed mapping stands for.
+
+use super::Techniques;
+use crate::{rng::unit_f32, sample::Block};
+
+/// The technique that a point has chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    /// Vertices of the light subpath, s.
+    pub light: u16,
+    /// Vertices of the camera subpath, t, the place on the lens included.
+    pub camera: u16,
+    /// One over the probability of the choice.
+    pub scale: f32,
+}
+
+impl Chosen {
+    /// Nothing at all.
+    pub const NONE: Chosen = Chosen { light: 0, camera: 0, scale: 0.0 };
+
+    /// Whether it is that technique.
+    #[inline(always)]
+    pub fn is(&self, light: u16, camera: u16) -> bool {
+        (self.light, self.camera) == (light, camera)
+    }
+}
+
+/// How often paths of each number of edges are chosen.
+///
+/// The length follows the given shares, the technique is uniform among those that make paths of that length, so that a
+/// small step in either of two dimensions keeps the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lengths {
+    /// Σ of probabilities up to each length, from 1 edge on; the last is 1.
+    cumulative: Vec<f32>,
+}
+
+/// Edges of the longest paths that are told apart; of those that a scene without limit could have, the longer ones are
+/// left out.
+const LONGEST: u16 = 128;
+/// How much rarer paths of one more edge are, where nothing is known of a scene.
+const DECAY: f64 = 0.75;
+/// The part of all points that follows [`DECAY`] whatever is known.
+const UNKNOWN: f64 = 0.2;
+
+impl Lengths {
+    /// For paths of up to `max_depth` edges of which nothing is known.
+    pub fn unknown(max_depth: u16) -> Lengths {
+        Lengths::of_shares(max_depth, &[])
+    }
+
+    /// In proportion to what paths of 1, 2, … edges contribute, as far as that is known.
+    pub fn of_shares(max_depth: u16, shares: &[f64]) -> Lengths {
+        let longest = usize::from(max_depth.min(LONGEST));
+        let known: f64 = shares.iter().take(longest).sum();
+        let decay = |i: usize| DECAY.powi(i as i32);
+        let all: f64 = (0..longest).map(decay).sum();
+        let mut sum = 0.0;
+        let mut cumulative: Vec<f32> = (0..longest)
+            .map(|i| {
+                let guess = decay(i) / all;
+                let share = shares.get(i).copied().unwrap_or(0.0);
+                sum += if known > 0.0 { UNKNOWN * guess + (1.0 - UNKNOWN) * share / known } else { guess };
+                sum as f32
+            })
+            .collect();
+        *cumulative.last_mut().expect("paths have an edge at least") = 1.0;
+        Lengths { cumulative }
+    }
+
+    /// Probability of a number of edges, from 1 on.
+    pub fn probability(&self, edges: usize) -> f32 {
+        self.cumulative[edges - 1] - if edges > 1 { self.cumulative[edges - 2] } else { 0.0 }
+    }
+
+    /// The technique for a block of words, of which the second decides on the length and the third on the technique.
+    #[inline]
+    pub fn choose(&self, [_, length, technique, _]: Block) -> Chosen {
+        let u = unit_f32(length);
+        let edges = self.cumulative.partition_point(|c| *c <= u).min(self.cumulative.len() - 1) + 1;
+        // s = 0 … n, but for lamps that are seen directly
+        let techniques = if edges == 1 { 1 } else { edges as u32 + 1 };
+        let light = ((u64::from(technique) * u64::from(techniques)) >> 32) as u16;
+        let camera = edges as u16 + 1 - light;
+        debug_assert!(Techniques::ALL.has(light, camera));
+        Chosen { light, camera, scale: techniques as f32 / self.probability(edges) }
+    }
+}

@@ -1,0 +1,481 @@
+//! Mappings that start paths at both ends, in batches: all lanes a bounce at a time, light subpaths first.
+//!
+//! Primary samples are those of the unidirectional mapping, so that the camera's subpath and its next-event estimation
+//! are the same, and a second stream for the light's subpath. Vertices of light subpaths are connected to the lens as
+//! they come and, where vertices of both subpaths are joined, kept until the camera's come. The rays that are alive stay
+//! compacted at the front of the arrays, so packets stay full; shadow rays are traced once a bounce.
+//!
+//! Source: Veach & Guibas 1995, "Optimally combining sampling techniques for Monte Carlo rendering" (bidirectional path
+//! tracing); Hachisuka et al. 2014, "Multiplexed Metropolis light transport".
+
+mod connections;
+mod lengths;
+pub mod scalar;
+mod subpath;
+mod techniques;
+#[cfg(test)]
+mod tests;
+mod weights;
+
+pub use lengths::{Chosen, Lengths};
+pub use techniques::Techniques;
+
+use connections::Seen;
+use subpath::{Arrival, CameraEnd, LightVertex, PLAIN, Particle, Site};
+use weights::Step;
+
+use super::{
+    Contribution, Contributions, FilmSplat, Mapping, Workspace,
+    tracing::{Kind, Tracing},
+    vertex::{Carried, Connection, Decisions},
+};
+use crate::{
+    embree::{Hits, MISS, Rays},
+    rng::unit_f32,
+    sample::{Move, Proposals},
+    scene::{Mixture, Profile, Rgb, Scattering, lights::Emission},
+};
+
+/// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
+#[derive(Default)]
+pub(super) struct Arrays {
+    /// Lanes that do not rest.
+    live: Vec<u32>,
+    /// By lane: position on the film, place on the lens, radiance there.
+    film: Vec<[f32; 2]>,
+    lens: Vec<[f32; 2]>,
+    radiance: Vec<Rgb>,
+    /// Technique of each lane, where points choose one.
+    chosen: Vec<Chosen>,
+    /// Lanes whose subpaths are alive, in step with `rays`, `steps`, and `particles` or `carried`.
+    lanes: Vec<u32>,
+    rays: Rays,
+    steps: Vec<Step>,
+    particles: Vec<Particle>,
+    carried: Vec<Carried>,
+    /// Starts of light subpaths, in step with `lanes` along their first edges.
+    emissions: Vec<Emission>,
+    hits: Hits,
+    /// Rays that hit something: their indices and lanes.
+    hit_slots: Vec<u32>,
+    hit_lanes: Vec<u32>,
+    /// Vertices of light subpaths by number and lane, and how many each lane has.
+    vertices: Vec<LightVertex>,
+    kept: Vec<u16>,
+    /// Scattering functions of those that are not plain.
+    mixtures: Vec<Mixture>,
+    waiting: Waiting,
+}
+
+/// Contributions that wait for their shadow rays.
+#[derive(Default)]
+struct Waiting {
+    rays: Rays,
+    lanes: Vec<u32>,
+    contributions: Vec<Rgb>,
+    /// Positions of splats on the film; none for connections to camera subpaths.
+    films: Vec<[f32; 2]>,
+    occluded: Vec<bool>,
+}
+
+impl Waiting {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.lanes.clear();
+        self.contributions.clear();
+        self.films.clear();
+    }
+
+    fn add(&mut self, lane: u32, connection: &Connection) {
+        self.rays.push(connection.origin, connection.direction, connection.tfar);
+        self.lanes.push(lane);
+        self.contributions.push(connection.contribution);
+    }
+
+    fn add_splat(&mut self, lane: u32, seen: &Seen) {
+        self.add(lane, &seen.connection);
+        self.films.push(seen.film);
+    }
+
+    fn trace(&mut self, mapping: &Mapping, tracing: &mut Tracing, out: &mut Contributions) {
+        tracing.occluded(mapping.scene(), mapping.widths(), &self.rays, &mut self.occluded, out);
+    }
+
+    /// The contributions that nothing is in the way of, by their places in the lists.
+    fn seen(&self) -> impl Iterator<Item = usize> {
+        self.occluded.iter().enumerate().filter(|(_, occluded)| !**occluded).map(|(i, _)| i)
+    }
+}
+
+/// All techniques of a batch.
+pub(super) fn evaluate<P: Profile>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    workspace: &mut Workspace,
+) {
+    trace_both::<P, false>(mapping, proposals, out, workspace);
+}
+
+/// One technique for each point of a batch.
+pub(super) fn multiplexed<P: Profile>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    workspace: &mut Workspace,
+) {
+    trace_both::<P, true>(mapping, proposals, out, workspace);
+}
+
+fn trace_both<P: Profile, const ONE: bool>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    workspace: &mut Workspace,
+) {
+    let Workspace { tracing, bidirectional: w, .. } = workspace;
+    begin::<ONE>(mapping, proposals, out, w);
+    follow_light::<P, ONE>(mapping, proposals, out, tracing, w);
+    if mapping.kind().techniques().follow_camera() {
+        follow_camera::<P, ONE>(mapping, proposals, out, tracing, w);
+    }
+    settle(proposals, w, out);
+}
+
+/// Draws what is chosen for both subpaths, and forgets all lanes' past.
+fn begin<const ONE: bool>(mapping: &Mapping, proposals: &mut Proposals, out: &mut Contributions, w: &mut Arrays) {
+    proposals.begin(&mut w.live);
+    proposals.draw(0, &w.live);
+    if let Some(block) = mapping.layout().light_choices() {
+        proposals.draw(block, &w.live);
+    }
+    let lanes = proposals.lanes();
+    w.radiance.clear();
+    w.radiance.resize(lanes, Rgb::ZERO);
+    w.film.resize(lanes, [0.0; 2]);
+    w.lens.resize(lanes, [0.0; 2]);
+    w.kept.clear();
+    w.kept.resize(lanes, 0);
+    w.mixtures.clear();
+    if ONE {
+        w.chosen.resize(lanes, Chosen::NONE);
+    }
+    for &lane in &w.live {
+        let at = lane as usize;
+        let [x, y, u, v] = proposals.block(0, at).map(unit_f32);
+        (w.film[at], w.lens[at]) = ([x, y], [u, v]);
+        out.elsewhere.clear(at);
+        if ONE && let Some(block) = mapping.layout().light_choices() {
+            w.chosen[at] = mapping.lengths().choose(proposals.block(block, at));
+        }
+    }
+}
+
+/// Light subpaths: connects their vertices to the lens and keeps those that will be joined.
+fn follow_light<P: Profile, const ONE: bool>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    tracing: &mut Tracing,
+    w: &mut Arrays,
+) {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
+    start_at_light::<P, ONE>(mapping, proposals, out, tracing, w);
+    // a path through vertex number j has an edge more, to the lens
+    for j in 1..layout.max_depth() {
+        if w.lanes.is_empty() {
+            break;
+        }
+        tracing.closest(scene, mapping.widths(), Kind::Bounce, &w.rays, &mut w.hits, out);
+        keep_hits(w);
+        proposals.draw(layout.light_bounce(j - 1), &w.hit_lanes);
+        w.waiting.clear();
+        scatter_light::<P, ONE>(mapping, j, proposals, w);
+        splat(mapping, tracing, w, out);
+    }
+}
+
+/// Starts a light subpath in every lane that has one, and connects the place where it starts to the lens.
+fn start_at_light<P: Profile, const ONE: bool>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    tracing: &mut Tracing,
+    w: &mut Arrays,
+) {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    w.lanes.clear();
+    if ONE {
+        w.lanes.extend(w.live.iter().filter(|lane| w.chosen[**lane as usize].light > 1));
+    } else {
+        w.lanes.extend_from_slice(&w.live);
+    }
+    proposals.draw(layout.emission(), &w.lanes);
+    w.rays.clear();
+    w.particles.clear();
+    w.emissions.clear();
+    w.waiting.clear();
+    let mut kept = 0;
+    for i in 0..w.lanes.len() {
+        let lane = w.lanes[i];
+        let Some(emission) = emit::<P>(mapping, proposals, lane as usize) else { continue };
+        if let Some(seen) = connections::lamp_to_camera(scene, techniques, &emission, w.lens[lane as usize]) {
+            w.waiting.add_splat(lane, &seen);
+        }
+        w.lanes[kept] = lane;
+        kept += 1;
+        w.rays.push(subpath::start_of(&emission), emission.direction, f32::MAX);
+        w.particles.push(Particle::new(emission.weight));
+        w.emissions.push(emission);
+    }
+    w.lanes.truncate(kept);
+    if techniques.lamp {
+        splat(mapping, tracing, w, out);
+    }
+}
+
+/// The start of a lane's light subpath.
+fn emit<P: Profile>(mapping: &Mapping, proposals: &Proposals, lane: usize) -> Option<Emission> {
+    let layout = mapping.layout();
+    let [a, b, c, d] = proposals.block(layout.emission(), lane).map(unit_f32);
+    let choice = layout.light_choices().map_or(0, |block| proposals.block(block, lane)[0]);
+    mapping.scene().emitters.emit::<P>([a, b], [c, d], unit_f32(choice))
+}
+
+/// Lists the rays that hit something.
+fn keep_hits(w: &mut Arrays) {
+    w.hit_slots.clear();
+    w.hit_lanes.clear();
+    for (i, lane) in w.lanes.iter().enumerate() {
+        if w.hits.geometry[i] != MISS {
+            w.hit_slots.push(i as u32);
+            w.hit_lanes.push(*lane);
+        }
+    }
+}
+
+/// At every hit of a light subpath: the lens to connect to, and the next edge, which replaces the one that led here.
+fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    let lanes = proposals.lanes();
+    let row = if ONE { 0 } else { usize::from(j - 1) * lanes };
+    if techniques.inner && w.vertices.len() < row + lanes {
+        w.vertices.resize(row + lanes, LightVertex::NOWHERE);
+    }
+    let mut kept = 0;
+    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
+        let (i, at) = (slot as usize, lane as usize);
+        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+        let hit = w.hits.get(i).expect("misses are gone");
+        let surface = scene.surface::<P>(hit, origin, direction);
+        let particle = w.particles[i];
+        let arrival: Arrival = if j == 1 {
+            particle.arrive_from_light::<P>(scene, techniques, &w.emissions[i], &surface)
+        } else {
+            particle.arrive_after(&w.steps[i], origin, direction, &surface)
+        };
+        let site = Site::of(&surface);
+        let chosen = if ONE { w.chosen[at] } else { Chosen::NONE };
+        let last = ONE && chosen.light == j + 1;
+        if !ONE || last && chosen.camera == 1 {
+            let seen = connections::to_camera::<P>(scene, techniques, &arrival, &site, w.lens[at], j);
+            if let Some(mut seen) = seen {
+                if ONE {
+                    seen.connection.contribution *= chosen.scale;
+                }
+                w.waiting.add_splat(lane, &seen);
+            }
+        }
+        if techniques.inner && (!ONE || last && chosen.camera > 1) {
+            let mixture = match &surface.scattering {
+                Scattering::Plain(_) => PLAIN,
+                Scattering::Mixed(mixture) => {
+                    w.mixtures.push(mixture.clone());
+                    w.mixtures.len() as u32 - 1
+                }
+            };
+            w.vertices[row + at] = LightVertex::new(&surface, mixture, &arrival);
+            w.kept[at] = if ONE { 1 } else { j };
+        }
+        if last || j + 1 == layout.max_depth() {
+            continue;
+        }
+        let block = proposals.block(layout.light_bounce(j - 1), at);
+        let decisions = Decisions::of_light(layout, j - 1, block, !ONE);
+        if let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) {
+            w.lanes[kept] = lane;
+            w.particles[kept] = edge.particle;
+            if w.steps.len() <= kept {
+                w.steps.push(edge.step);
+            }
+            w.steps[kept] = edge.step;
+            w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
+            kept += 1;
+        }
+    }
+    w.lanes.truncate(kept);
+    w.particles.truncate(kept);
+    w.rays.truncate(kept);
+}
+
+/// Traces the shadow rays of splats and puts those that are seen onto the lists of their lanes.
+fn splat(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays, out: &mut Contributions) {
+    let waiting = &mut w.waiting;
+    waiting.trace(mapping, tracing, out);
+    for i in waiting.seen() {
+        let splat = FilmSplat { film: waiting.films[i], rgb: waiting.contributions[i] };
+        out.elsewhere.push(waiting.lanes[i] as usize, splat);
+    }
+}
+
+/// Camera subpaths: emission, next-event estimation and the vertices of light subpaths at each of their vertices.
+fn follow_camera<P: Profile, const ONE: bool>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    tracing: &mut Tracing,
+    w: &mut Arrays,
+) {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
+    start_at_camera::<ONE>(mapping, w);
+    for j in 1..=layout.max_depth() {
+        if w.lanes.is_empty() {
+            break;
+        }
+        let kind = if j == 1 { Kind::Camera } else { Kind::Bounce };
+        tracing.closest(scene, mapping.widths(), kind, &w.rays, &mut w.hits, out);
+        collect_background::<P, ONE>(mapping, j, w);
+        keep_hits(w);
+        if j < layout.max_depth() {
+            proposals.draw(layout.bounce(j - 1), &w.hit_lanes);
+            if let Some(block) = layout.choices(j - 1) {
+                proposals.draw(block, &w.hit_lanes);
+            }
+        }
+        w.waiting.clear();
+        scatter_camera::<P, ONE>(mapping, j, proposals, w);
+        w.waiting.trace(mapping, tracing, out);
+        for i in w.waiting.seen() {
+            w.radiance[w.waiting.lanes[i] as usize] += w.waiting.contributions[i];
+        }
+    }
+}
+
+/// Starts a camera subpath in every lane that has one.
+fn start_at_camera<const ONE: bool>(mapping: &Mapping, w: &mut Arrays) {
+    w.lanes.clear();
+    if ONE {
+        w.lanes.extend(w.live.iter().filter(|lane| w.chosen[**lane as usize].camera > 1));
+    } else {
+        w.lanes.extend_from_slice(&w.live);
+    }
+    w.rays.clear();
+    w.carried.clear();
+    for &lane in &w.lanes {
+        let ray = mapping.scene().camera.ray(w.film[lane as usize], w.lens[lane as usize]);
+        w.rays.push(ray.origin, ray.direction, ray.tfar);
+        w.carried.push(Carried::START);
+    }
+}
+
+/// Adds the background to the paths that left the scene by their edge number `j`.
+fn collect_background<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, w: &mut Arrays) {
+    if P::FLAT_MESHES || mapping.scene().emitters.surrounding_light().is_none() {
+        return;
+    }
+    for i in 0..w.lanes.len() {
+        let at = w.lanes[i] as usize;
+        if w.hits.geometry[i] != MISS || ONE && !w.chosen[at].is(0, j + 1) {
+            continue;
+        }
+        let tail = if j == 1 { subpath::STRAIGHT_OUT } else { w.steps[i].arrive_at_infinity() };
+        let end = CameraEnd { carried: w.carried[i], tail };
+        let techniques = mapping.kind().techniques();
+        let radiance = connections::background::<P>(mapping.scene(), techniques, w.rays.direction(i), &end, j);
+        w.radiance[at] += if ONE { radiance * w.chosen[at].scale } else { radiance };
+    }
+}
+
+/// At every hit of a camera subpath, its vertex number `j`: emission, connections, and the next edge, which replaces the
+/// one that led here.
+fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    let lanes = proposals.lanes();
+    let bounce = j - 1;
+    let mut kept = 0;
+    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
+        let (i, at) = (slot as usize, lane as usize);
+        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+        let hit = w.hits.get(i).expect("misses are gone");
+        let surface = scene.surface::<P>(hit, origin, direction);
+        let tail = if j == 1 {
+            subpath::arrive_from_eye(scene, &surface, direction, w.lens[at])
+        } else {
+            w.steps[i].arrive((surface.p - origin).length_squared(), surface.ng.dot(direction).abs())
+        };
+        let end = CameraEnd { carried: w.carried[i], tail };
+        let chosen = if ONE { w.chosen[at] } else { Chosen::NONE };
+        let scale = if ONE { chosen.scale } else { 1.0 };
+        if !ONE || chosen.is(0, j + 1) {
+            w.radiance[at] += connections::hit::<P>(scene, techniques, &surface, (origin, direction), &end, j) * scale;
+        }
+        if j == layout.max_depth() {
+            continue;
+        }
+        let choices = layout.choices(bounce).map(|block| proposals.block(block, at));
+        let mut decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), at), choices);
+        let site = Site::of(&surface);
+        if !ONE || chosen.is(1, j + 1) {
+            let connection = connections::next_event::<P>(scene, techniques, &site, &end, &decisions, j);
+            if let Some(mut connection) = connection {
+                connection.contribution *= scale;
+                w.waiting.add(lane, &connection);
+            }
+        }
+        if techniques.inner && w.kept[at] > 0 && (!ONE || chosen.camera == j + 1) && site.scattering.is_smooth::<P>() {
+            // as many edges as both subpaths have, and the one between
+            let longest = if ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
+            for i in 1..=longest {
+                let vertex = &w.vertices[usize::from(i - 1) * lanes + at];
+                let light = vertex.site::<P>(scene, &w.mixtures);
+                let number = if ONE { chosen.light - 1 } else { i };
+                let ends = ((&vertex.arrival, &light, number), (&end, &site, j));
+                if let Some(mut connection) = connections::join::<P>(techniques, ends.0, ends.1) {
+                    connection.contribution *= scale;
+                    w.waiting.add(lane, &connection);
+                }
+            }
+        }
+        if ONE {
+            if chosen.camera == j + 1 {
+                continue;
+            }
+            decisions.survive();
+        }
+        if let Some((edge, step)) = subpath::scatter_camera::<P>(&surface, &end, &decisions, techniques, j) {
+            w.lanes[kept] = lane;
+            w.carried[kept] = edge.carried;
+            if w.steps.len() <= kept {
+                w.steps.push(step);
+            }
+            w.steps[kept] = step;
+            w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
+            kept += 1;
+        }
+    }
+    w.lanes.truncate(kept);
+    w.carried.truncate(kept);
+    w.rays.truncate(kept);
+}
+
+/// Turns radiances and splats into contributions and settles those that are not finite.
+fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
+    for (lane, m) in proposals.moves.iter().enumerate() {
+        if *m != Move::Rest {
+            let (contribution, faults) =
+                Contribution::settle_whole(w.film[lane], w.radiance[lane], &mut out.elsewhere, lane);
+            out.lanes[lane] = contribution;
+            out.non_finite += faults;
+        }
+    }
+}

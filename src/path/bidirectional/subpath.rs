@@ -1,0 +1,281 @@
+//! What happens at the vertices of both subpaths. The batch and the scalar mapping are both made of these, so that they
+//! agree to the bit.
+
+use glam::Vec3;
+
+use super::{
+    Techniques,
+    weights::{Step, Tail},
+};
+use crate::{
+    math::{Frame, offset_origin},
+    path::vertex::{self, Carried, Decisions, Edge},
+    scene::{
+        Mixture, Profile, Rgb, ScatteringRef, Scene, Surface,
+        lights::{Emission, EmitterKind},
+    },
+};
+
+/// A place where a path scatters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Site<'a> {
+    pub p: Vec3,
+    /// Unit geometric normal.
+    pub ng: Vec3,
+    /// As in [`Surface`].
+    pub lift: Vec3,
+    pub frame: Frame,
+    /// Local direction to where the subpath came from.
+    pub wo: Vec3,
+    pub scattering: ScatteringRef<'a>,
+}
+
+impl<'a> Site<'a> {
+    #[inline(always)]
+    pub fn of(surface: &'a Surface<'_>) -> Site<'a> {
+        let &Surface { p, ng, lift, frame, wo, ref scattering, .. } = surface;
+        Site { p, ng, lift, frame, wo, scattering: scattering.by_reference() }
+    }
+
+    /// |cos| between a world direction and the geometric normal.
+    #[inline(always)]
+    pub fn cos(&self, direction: Vec3) -> f32 {
+        self.ng.dot(direction).abs()
+    }
+
+    /// Where a ray in about that world direction starts.
+    #[inline(always)]
+    pub fn start_towards(&self, direction: Vec3) -> Vec3 {
+        offset_origin(self.p, if self.lift.dot(direction) >= 0.0 { self.lift } else { -self.lift })
+    }
+}
+
+/// A vertex of a light subpath, kept until camera subpaths are connected to it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightVertex {
+    p: Vec3,
+    ng: Vec3,
+    lift: Vec3,
+    frame: Frame,
+    wo: Vec3,
+    appearance: u32,
+    /// Place among the mixtures that are kept, or [`PLAIN`].
+    mixture: u32,
+    pub arrival: Arrival,
+}
+
+/// Marks vertices whose scattering functions are the same everywhere.
+pub(super) const PLAIN: u32 = u32::MAX;
+
+impl LightVertex {
+    #[inline(always)]
+    pub fn new(surface: &Surface, mixture: u32, arrival: &Arrival) -> LightVertex {
+        let &Surface { p, ng, lift, frame, wo, appearance, .. } = surface;
+        LightVertex { p, ng, lift, frame, wo, appearance, mixture, arrival: *arrival }
+    }
+
+    /// A place to be filled.
+    pub const NOWHERE: LightVertex = LightVertex {
+        p: Vec3::ZERO,
+        ng: Vec3::Z,
+        lift: Vec3::Z,
+        frame: Frame { s: Vec3::X, t: Vec3::Y, n: Vec3::Z },
+        wo: Vec3::Z,
+        appearance: 0,
+        mixture: PLAIN,
+        arrival: Arrival { flux: Rgb::ZERO, left: Rgb::ZERO, tail: STRAIGHT_OUT },
+    };
+
+    /// The place, with its scattering function from wherever it is.
+    #[inline(always)]
+    pub fn site<'a, P: Profile>(&self, scene: &'a Scene, mixtures: &'a [Mixture]) -> Site<'a> {
+        let scattering = if P::VARYING && self.mixture != PLAIN {
+            ScatteringRef::Mixed(&mixtures[self.mixture as usize])
+        } else {
+            ScatteringRef::Plain(scene.material(self.appearance))
+        };
+        let &LightVertex { p, ng, lift, frame, wo, .. } = self;
+        Site { p, ng, lift, frame, wo, scattering }
+    }
+}
+
+/// What a light subpath carries along an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Particle {
+    /// Emitted power over all densities so far, times all reflectances.
+    pub flux: Rgb,
+    /// The part of the emitted power that is left, by which roulette is played.
+    pub left: Rgb,
+}
+
+/// A light subpath at its last vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrival {
+    /// Its flux over |cos| of the last edge by the geometric normal: f |cos| by the shading normal times this is what
+    /// leaves.
+    pub flux: Rgb,
+    pub left: Rgb,
+    pub tail: Tail,
+}
+
+/// Cosines that fluxes are divided by are kept from 0.
+const LEAST_COSINE: f32 = 1e-9;
+
+impl Particle {
+    #[inline(always)]
+    fn arrive(&self, cos: f32, tail: Tail) -> Arrival {
+        Arrival { flux: self.flux / cos.max(LEAST_COSINE), left: self.left, tail }
+    }
+
+    /// At the start, `flux` being that of the emission.
+    pub fn new(flux: Rgb) -> Particle {
+        Particle { flux, left: Rgb::ONE }
+    }
+
+    /// Arrives at the first vertex after the light.
+    #[inline(always)]
+    pub fn arrive_from_light<P: Profile>(
+        &self,
+        scene: &Scene,
+        techniques: Techniques,
+        emission: &Emission,
+        surface: &Surface,
+    ) -> Arrival {
+        let cos = surface.ng.dot(emission.direction).abs();
+        let pdf_place = f64::from(emission.pdf_place);
+        let hit = |there: bool| if there && techniques.hit { 1.0 / (pdf_place * pdf_place) } else { 0.0 };
+        let mut step = Step { density: f64::from(emission.pdf_rest), cos: 1.0, before: 0.0, shorter: 1.0 };
+        let d2 = (surface.p - emission.origin).length_squared();
+        let direct = |pdf: f32| {
+            let ratio = f64::from(pdf) / pdf_place;
+            ratio * ratio
+        };
+        let tail = match emission.kind {
+            EmitterKind::Surface => {
+                let cos_light = emission.normals[0].dot(emission.direction).abs();
+                step.cos = f64::from(cos_light);
+                step.before = hit(true);
+                if !P::FLAT_MESHES {
+                    let pdf = scene.emitters.pdf::<P>(emission.light, surface.p, emission.origin, emission.normals[0]);
+                    step.shorter = direct(pdf * cos_light / d2);
+                }
+                step.arrive(d2, cos)
+            }
+            _ if P::FLAT_MESHES => unreachable!("a profile with lights on flat meshes only"),
+            EmitterKind::Point => step.arrive(d2, cos),
+            EmitterKind::SingleDirection => step.arrive_from_infinity(cos),
+            EmitterKind::Surrounding => {
+                step.before = hit(true);
+                let towards = -emission.direction;
+                let pdf = scene.emitters.pdf::<P>(emission.light, surface.p, towards, towards);
+                step.shorter = direct(pdf);
+                step.arrive_from_infinity(cos)
+            }
+        };
+        self.arrive(cos, tail)
+    }
+
+    /// Arrives at a later vertex from `origin`.
+    #[inline(always)]
+    pub fn arrive_after(&self, step: &Step, origin: Vec3, direction: Vec3, surface: &Surface) -> Arrival {
+        let cos = surface.ng.dot(direction).abs();
+        self.arrive(cos, step.arrive((surface.p - origin).length_squared(), cos))
+    }
+}
+
+/// Where the ray of an emission starts.
+#[inline(always)]
+pub(super) fn start_of(emission: &Emission) -> Vec3 {
+    offset_origin(emission.origin, emission.ng)
+}
+
+/// The next edge of a light subpath.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightEdge {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub particle: Particle,
+    pub step: Step,
+}
+
+/// Scattering of a light subpath at its vertex number `j`, counted from the one on the light, and roulette.
+///
+/// Light goes from `wo` to the sampled direction, against the arguments of scattering functions: what counts is f(wi, wo).
+/// For perfect refraction that is f(wo, wi) times the square of the ratio of indices. Shading normals do not conserve
+/// energy that way round, which brings the cosines of both normals in (Veach 1997, section 5.3).
+#[inline(always)]
+pub(super) fn scatter_light<P: Profile>(
+    site: &Site,
+    arrival: &Arrival,
+    decisions: &Decisions,
+    techniques: Techniques,
+    j: u16,
+) -> Option<LightEdge> {
+    let sample = site.scattering.sample::<P>(site.wo, decisions.direction, decisions.lobe)?;
+    let direction = site.frame.to_world(sample.wi);
+    let cos = site.cos(direction);
+    let (weight, densities) = if !P::DIFFUSE && sample.pdf == f32::INFINITY {
+        let shading = site.wo.z.abs() / sample.wi.z.abs().max(LEAST_COSINE);
+        (sample.weight * (sample.eta * sample.eta * shading), None)
+    } else {
+        let there = site.scattering.evaluate::<P>(sample.wi, site.wo);
+        (there.value / sample.pdf, Some([sample.pdf, there.pdf]))
+    };
+    let flux = arrival.flux * weight * cos;
+    // what is left of the power by what arrived: both fluxes, but for the cosine that one of them was divided by
+    let cos_before = site.cos(site.frame.to_world(site.wo)).max(LEAST_COSINE);
+    let mut particle = Particle { flux, left: arrival.left * weight * (cos / cos_before) };
+    if let Some(u) = decisions.roulette {
+        let survival = particle.left.max_element().min(0.95);
+        if u >= survival {
+            return None;
+        }
+        particle.flux /= survival;
+        particle.left /= survival;
+    }
+    if particle.flux == Rgb::ZERO {
+        return None;
+    }
+    let step = arrival.tail.leave(densities, cos, techniques.has(j, 2));
+    Some(LightEdge { origin: site.start_towards(direction), direction, particle, step })
+}
+
+/// A camera subpath at its last vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CameraEnd {
+    pub carried: Carried,
+    pub tail: Tail,
+}
+
+/// Arrives at the first vertex after the lens.
+#[inline(always)]
+pub(super) fn arrive_from_eye(scene: &Scene, surface: &Surface, direction: Vec3, lens: [f32; 2]) -> Tail {
+    let cos = surface.ng.dot(direction).abs();
+    let density = scene.camera.density(surface.p, lens);
+    Step { density: f64::from(density), cos: 0.0, before: 0.0, shorter: 1.0 }.arrive(1.0, cos)
+}
+
+/// The tail of a camera path that leaves the scene at once.
+pub(super) const STRAIGHT_OUT: Tail = Tail { inverse_density: 0.0, shorter: 1.0, earlier: 0.0 };
+
+/// Scattering of a camera subpath at its vertex number `j`, counted from the lens, and roulette.
+#[inline(always)]
+pub(super) fn scatter_camera<P: Profile>(
+    surface: &Surface,
+    end: &CameraEnd,
+    decisions: &Decisions,
+    techniques: Techniques,
+    j: u16,
+) -> Option<(Edge, Step)> {
+    let edge = vertex::scatter::<P>(surface, &end.carried, decisions)?;
+    let site = Site::of(surface);
+    let pdf = edge.carried.pdf;
+    let densities = if !P::DIFFUSE && pdf == f32::INFINITY {
+        None
+    } else {
+        let wi = site.frame.to_local(edge.direction);
+        Some([pdf, site.scattering.evaluate::<P>(wi, site.wo).pdf])
+    };
+    let step = end.tail.leave(densities, site.cos(edge.direction), techniques.has(2, j));
+    Some((edge, step))
+}
