@@ -27,6 +27,8 @@ pub enum Purpose {
     Turn = 7,
     /// Seeds of the passes that a reference is the mean of.
     Pass = 8,
+    /// Points that mappings are tried with.
+    Trial = 9,
 }
 
 /// Identifies one call for four random words.

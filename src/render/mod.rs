@@ -13,6 +13,7 @@ pub mod settings;
 pub mod status;
 #[cfg(test)]
 mod tests;
+pub mod trial;
 
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};

@@ -17,6 +17,7 @@ use super::{
     replica_exchange::ReplicaExchange,
     settings::{MappingChoice, Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
+    trial,
 };
 use crate::{
     film::Footprint,
@@ -74,9 +75,12 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
-    let kind = match job.settings.mapping {
-        MappingChoice::Auto => MappingKind::Unidirectional,
-        MappingChoice::Fixed(kind) => kind,
+    let (kind, trial) = match job.settings.mapping {
+        MappingChoice::Auto => {
+            let trial = pool.install(|| trial::try_mappings(job.scene, job.settings.seed));
+            (trial.chosen, Some(trial.why()))
+        }
+        MappingChoice::Fixed(kind) => (kind, None),
     };
     let widths = match job.settings.packet {
         PacketChoice::Auto => calibration::calibrate(job.scene, kind),
@@ -88,7 +92,7 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(job.settings.seed),
     };
-    let start = run_start(job, threads, widths);
+    let start = RunStart { mapping: kind.name(), mapping_trial: trial, ..run_start(job, threads, widths) };
     observer.started(&start);
     let mut watch = Watch { clock, set_up: SetUp::default(), last_round: None };
     watch.set_up.calibration = watch.clock.elapsed();
@@ -253,6 +257,7 @@ fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
             bounce: widths.bounce.lanes(),
             shadow: widths.shadow.lanes(),
         },
+        ..RunStart::default()
     }
 }
 

@@ -23,6 +23,10 @@ pub struct RunStart {
     pub settings: Settings,
     /// Worker threads, in fact.
     pub threads: usize,
+    /// The mapping, in fact.
+    pub mapping: &'static str,
+    /// Why that one, where a trial chose it.
+    pub mapping_trial: Option<String>,
     /// Inverse temperatures of the rungs, in fact; empty where there is no ladder.
     pub betas: Vec<f64>,
     /// What the scene uses, one short phrase each.

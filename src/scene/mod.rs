@@ -78,7 +78,10 @@ impl Scene {
             to_world: instance.to_world,
         }));
         let tracer = embree::Scene::watched(device, geometries, watch)?;
-        let around = |(low, high): (glam::Vec3, glam::Vec3)| Ball { center: 0.5 * (low + high), radius: 0.5 * (high - low).length() };
+        let around = |(low, high): (glam::Vec3, glam::Vec3)| Ball {
+            center: 0.5 * (low + high),
+            radius: 0.5 * (high - low).length(),
+        };
         let bounds = tracer.bounds().map_or(Ball { center: glam::Vec3::ZERO, radius: 1.0 }, around);
         let (emitters, light_of_shape) = Emitters::new(&description, bounds);
         let lights = light_of_shape.into_iter().chain(std::iter::repeat(None)); // shapes of groups do not emit

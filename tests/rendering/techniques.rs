@@ -66,7 +66,11 @@ fn scratch() {
             println!(
                 "  {:14} total {:.5} ± {:.5} for {:.5} ± {:.5}; {:.2} s; z {:?}",
                 kind.name(),
-                total(&other), sd(&other), total(&base), sd(&base), start.elapsed().as_secs_f64(),
+                total(&other),
+                sd(&other),
+                total(&base),
+                sd(&base),
+                start.elapsed().as_secs_f64(),
                 z.iter().map(|z| (z * 10.0).round() / 10.0).collect::<Vec<_>>()
             );
         }
