@@ -22,7 +22,7 @@ use relt::chain::{Evaluator, Recorder, Start, Target, Walkers, replay, resample}
 use relt::embree::Hits;
 use relt::film::{Accumulator, Footprint, Splats};
 use relt::path::unidirectional::{Mapping, Workspace};
-use relt::path::{Contribution, Contributions};
+use relt::path::{Contribution, Contributions, Whole};
 use relt::render::calibration::{LANES, record_rays};
 use relt::rng::{Counter, Purpose, Rng, open_unit_f64};
 use relt::sample::{Move, Points, Proposals, StepLaw};
@@ -169,7 +169,7 @@ fn shade(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 /// A step that chains made: what was proposed to them and the numbers that decided.
 struct Step {
     points: Points,
-    proposed: Vec<Contribution>,
+    proposed: Contributions,
     decisions: Vec<f64>,
 }
 
@@ -189,9 +189,9 @@ fn accept(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 /// probabilities of acceptance.
 fn make(chains: &mut Walkers, step: &Step) -> [f64; 2] {
     let [mut recorded, mut accepted] = [0.0; 2];
-    for (lane, (proposed, u)) in step.proposed.iter().zip(&step.decisions).enumerate() {
-        let mut record = |state: &Contribution, weight: f64| recorded += weight * f64::from(state.rgb.x);
-        accepted += chains.step(lane, 1.0, (&step.points, lane), proposed, *u, &mut record);
+    for (lane, u) in step.decisions.iter().enumerate() {
+        let mut record = |state: Whole, weight: f64| recorded += weight * f64::from(state.main.rgb.x);
+        accepted += chains.step(lane, 1.0, (&step.points, lane), &step.proposed, *u, &mut record);
     }
     [recorded, accepted]
 }
@@ -218,7 +218,7 @@ fn record_steps(subject: &Subject) -> (Walkers, Vec<Step>) {
         let decision = |counter: &Counter| Counter { purpose: Purpose::Step, ..*counter };
         let step = Step {
             points: paths.points.clone(),
-            proposed: paths.out.lanes.clone(),
+            proposed: paths.out.clone(),
             decisions: paths.counters.iter().map(|c| open_unit_f64(paths.rng().words(decision(c), 0)[0])).collect(),
         };
         let [_, alphas] = make(&mut chains, &step);
@@ -235,16 +235,16 @@ fn splat(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let prepared = OnceCell::new();
     let mut splats = Splats::new(1);
     group.bench_function("splat", |bencher| {
-        let (lanes, film, footprint, size) = prepared.get_or_init(|| {
+        let (out, film, footprint, size) = prepared.get_or_init(|| {
             let scene = subject.scene();
             let [width, height] = [scene.film.width, scene.film.height];
             let film = Accumulator::new(width, height, 1, f64::from(scene.emitters.brightest()));
             let footprint = Footprint::new(scene.film.filter, width, height);
-            (evaluated(subject).out.lanes, film, footprint, [width as f32, height as f32])
+            (evaluated(subject).out, film, footprint, [width as f32, height as f32])
         });
         bencher.iter(|| {
             let mut recorder = Recorder { footprint, size: *size, splats: &mut splats };
-            lanes.iter().for_each(|contribution| recorder.splat(0, contribution, 1.0, 1.0));
+            (0..out.lanes.len()).for_each(|lane| recorder.splat(0, out.whole(lane), 1.0, 1.0));
             film.deposit(&mut splats);
         });
     });

@@ -45,10 +45,9 @@ fn walk<T: Target>(target: &T, starts: &[Start], beta: f64, step: Move, steps: u
         evaluator.counters.iter_mut().for_each(|c| c.step = number);
         evaluator.evaluate(target, &walkers.points);
         for lane in 0..starts.len() {
-            let proposed = evaluator.out.lanes[lane];
             let decision = Counter { purpose: Purpose::Step, ..evaluator.counters[lane] };
             let u = open_unit_f64(rng.words(decision, 0)[0]);
-            walkers.step(lane, beta, (&evaluator.points, lane), &proposed, u, &mut |_, _| {});
+            walkers.step(lane, beta, (&evaluator.points, lane), &evaluator.out, u, &mut |_, _| {});
         }
     }
     before.into_iter().zip(places(&walkers)).map(|(before, after)| [before, after]).collect()

@@ -85,11 +85,16 @@ impl<W: Default + Send> Sampler<W> {
     /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
     fn weigh(&mut self) {
         let layer = self.screen.layers.even.expect("a layer of stratified points");
+        let mut sums = self.screen.film.layer(layer.own);
+        if let Some(elsewhere) = layer.elsewhere {
+            let more = self.screen.film.layer(elsewhere);
+            sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
+        }
         let luminance = |[r, g, b, points]: [f64; 4]| {
             let rgb = Rgb::new(r as f32, g as f32, b as f32);
             [f64::from(crate::path::luminance(rgb)), points]
         };
-        let found: Vec<[f64; 2]> = self.screen.film.layer(layer).into_iter().map(luminance).collect();
+        let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
         let importance = Arc::new(Importance::new(self.screen.size, &found));
         for portion in &mut self.portions {
             portion.uniform.set_importance(&importance);
