@@ -170,7 +170,7 @@ fn sweeps_leave_every_rung_as_it_was() {
     for (offers, betas) in [(1, vec![0.0, 1.0]), (1, vec![0.0, 0.4, 1.0]), (5, vec![0.0, 0.1, 0.3, 0.6, 1.0])] {
         let ladder = Ladder::new(betas);
         let rungs = ladder.rungs();
-        let stage = Stage::new(ladder, &vec![0.0; rungs], 1);
+        let stage = Stage::new(ladder, &vec![0.0; rungs], 1, false);
         let (canvas, round) = (stage.canvas(), &stage.round);
         let draws: Vec<Vec<Start>> = (1..rungs)
             .map(|k| {
