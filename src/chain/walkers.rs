@@ -88,3 +88,39 @@ impl Walkers {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{path::FilmSplat, scene::Rgb};
+
+    /// Lane i contributes i + 1 at its own place and i times 1 elsewhere.
+    fn proposed() -> Contributions {
+        let mut out = Contributions::new(3);
+        for lane in 0..3 {
+            (0..lane).for_each(|_| out.elsewhere.push(lane, FilmSplat { film: [0.5; 2], rgb: Rgb::splat(1.0) }));
+            let rgb = Rgb::splat(lane as f32 + 1.0);
+            out.lanes[lane] = Contribution::settle_whole([0.0; 2], rgb, &mut out.elsewhere, lane).0;
+        }
+        out
+    }
+
+    #[test]
+    fn what_a_state_gives_elsewhere_comes_and_goes_with_it() {
+        let (points, out) = (Points::new(3), proposed());
+        let mut walkers = Walkers::new(1);
+        let mut seen = Vec::new();
+        let mut record = |whole: Whole, weight: f64| seen.push((whole.main.rgb.x, whole.elsewhere.len(), weight));
+        walkers.replace(0, (&points, 2), &out, &mut record);
+        // from 5 to 1 with α = 1/5, refused; to 3 with α = 3/5, accepted; to nothing
+        assert!((walkers.step(0, 1.0, (&points, 0), &out, 0.9, &mut record) - 0.2).abs() < 1e-6);
+        assert!((walkers.step(0, 1.0, (&points, 1), &out, 0.5, &mut record) - 0.6).abs() < 1e-6);
+        walkers.flush(0, &mut record);
+        let expected = [(1.0, 0, 0.2), (3.0, 2, 1.2), (2.0, 1, 0.6)];
+        assert_eq!(seen.len(), expected.len(), "{seen:?}");
+        for (got, expected) in seen.iter().zip(expected) {
+            assert_eq!((got.0, got.1), (expected.0, expected.1), "{seen:?}");
+            assert!((got.2 - expected.2).abs() < 1e-6, "{seen:?}");
+        }
+    }
+}

@@ -354,3 +354,82 @@ impl Tally {
         self.counts.fill(RungCounts::default());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        film::Filter,
+        path::{Contribution, Elsewhere, FilmSplat},
+        scene::Rgb,
+        tempering::probes::EVEN,
+    };
+
+    /// A film of two pixels, probed both, and a point that gives 1 to the first, where it lies, and 1 + 2 to the second:
+    /// g = 4, so that with ζ = ρ = 1 it counts 1/5 in the balanced image.
+    #[test]
+    fn parts_of_a_point_go_where_they_belong_and_count_as_one_point() {
+        let (map, footprint, groups) = (ProbeMap::new([2, 1]), Footprint::new(Filter::Box, 2, 1), PointGroups::new(1));
+        let layers = Layers::of(&Choices::default(), 2, true);
+        let (film, probes) = (Accumulator::new(2, 1, layers.count, 1.0), Probes::new(&map, 1.0));
+        let canvas = Canvas {
+            footprint: &footprint,
+            size: [2, 1],
+            film: &film,
+            unit: 1.0,
+            layers,
+            probes: Some((&map, &probes)),
+            groups: &groups,
+        };
+        let ladder = Ladder::even(2);
+        let round = Round {
+            weights: Weights::new(&ladder, &[0.0; 2], 1.0, 0.0),
+            ladder,
+            mixes: std::array::from_fn(|_| Vec::new()),
+            effort: [2.0, 0.5],
+            only_offers: false,
+            half: u64::MAX,
+        };
+        let mut elsewhere = Elsewhere::new(1);
+        for value in [1.0, 2.0] {
+            elsewhere.push(0, FilmSplat { film: [0.75, 0.5], rgb: Rgb::splat(value) });
+        }
+        let (main, _) = Contribution::settle_whole([0.25, 0.5], Rgb::splat(1.0), &mut elsewhere, 0);
+        let whole = Whole { main: &main, elsewhere: elsewhere.of(0) };
+        let mut tally = Tally::new(2, layers.count);
+        tally.uniform_point(&canvas, &round, whole, true);
+        tally.state(&canvas, &round, 1, whole, 0.5);
+        tally.deposit(&canvas, 0, None);
+
+        // value and weight of both pixels
+        let near = |got: [[f64; 2]; 2], expected: [[f64; 2]; 2], what: &str| {
+            let close = got.as_flattened().iter().zip(expected.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-6);
+            assert!(close, "{what}: {got:?} in the place of {expected:?}");
+        };
+        let layer = |layer: usize| [0, 1].map(|i| [film.layer(layer)[i][0], film.layer(layer)[i][3]]);
+        let (even, hot) = (layers.even.unwrap(), layers.hot.unwrap());
+        near(layer(even.own), [[1.0, 1.0], [0.0, 0.0]], "stratified points");
+        near(layer(even.elsewhere.unwrap()), [[0.0, 0.0], [3.0, 0.0]], "what they give elsewhere");
+        near(layer(hot.own), [[0.4, 2.0], [0.0, 0.0]], "balanced points");
+        near(layer(hot.elsewhere.unwrap()), [[0.0, 0.0], [1.2, 0.0]], "what they give elsewhere");
+        near(layer(layers.tempered.unwrap()), [[0.05, 0.25], [0.15, 0.0]], "states");
+        let probed = |ratio, of: [usize; 2]| [0, 1].map(|probe| of.map(|i| probes.sums(ratio)[probe][0][i]));
+        near(probed(0, [0, 2]), [[1.0, 1.0], [3.0, 0.0]], "points and their number in probes");
+        near(probed(EVEN, [1, 3]), [[0.1, 0.02], [0.3, 0.5 * (0.04 + 0.16)]], "states and their squares in probes");
+        assert!((tally.counts[0].luminance - 1.6).abs() < 1e-6 && (tally.counts[1].luminance - 0.2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn layers_for_what_goes_elsewhere_are_there_only_if_wanted() {
+        for layers in [false, true] {
+            for combine in Combine::ALL {
+                let choices = Choices { combine, layers, ..Choices::default() };
+                let [without, with] = [false, true].map(|elsewhere| Layers::of(&choices, 3, elsewhere));
+                let points = |layers: Layers| [layers.uniform, layers.even, layers.hot].into_iter().flatten();
+                assert_eq!(with.count - without.count, points(with).count());
+                assert!(points(without).all(|layer| layer.elsewhere.is_none()));
+                assert!(points(with).all(|layer| layer.elsewhere.is_some()));
+            }
+        }
+    }
+}

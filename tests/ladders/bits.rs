@@ -97,7 +97,12 @@ fn looking_at_the_picture_changes_nothing() {
 
 /// What a block of ladders on a target with g ≤ `largest` records in 40 sweeps in parts of `lanes_a_part`: film, histograms,
 /// counts, round trips.
-fn block<T: Target>(target: &T, largest: f64, lanes_a_part: usize, threads: usize) -> (Vec<[f64; 4]>, Vec<Histogram>, Vec<RungCounts>, [u64; 2]) {
+fn block<T: Target>(
+    target: &T,
+    largest: f64,
+    lanes_a_part: usize,
+    threads: usize,
+) -> (Vec<[f64; 4]>, Vec<Histogram>, Vec<RungCounts>, [u64; 2]) {
     const LADDERS: usize = 5;
     let rng = Rng::new(3);
     let ladder = Ladder::new(vec![0.0, 0.1, 0.3, 0.6, 1.0]);
