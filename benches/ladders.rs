@@ -66,7 +66,7 @@ impl Ladders {
         let ladder = Ladder::even(rungs);
         // g^β has the normaliser 4^β/(2β + 1)
         let ln_z: Vec<f64> = ladder.betas().iter().map(|beta| beta * 4f64.ln() - (2.0 * beta + 1.0).ln()).collect();
-        let layers = Layers::of(&Choices { combine: Combine::Balance, ..Choices::default() }, rungs);
+        let layers = Layers::of(&Choices { combine: Combine::Balance, ..Choices::default() }, rungs, false);
         let round = Round {
             weights: Weights::new(&ladder, &ln_z, 1.0, 0.0),
             mixes: std::array::from_fn(|_| vec![StepMix::about(STEPS); rungs]),

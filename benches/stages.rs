@@ -21,8 +21,7 @@ use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_gr
 use relt::chain::{Evaluator, Recorder, Start, Target, Walkers, replay, resample};
 use relt::embree::Hits;
 use relt::film::{Accumulator, Footprint, Splats};
-use relt::path::{Contribution, Contributions};
-use relt::path::{Mapping, Workspace};
+use relt::path::{Contribution, Contributions, Mapping, MappingKind, Whole, Workspace};
 use relt::render::calibration::{LANES, record_rays};
 use relt::rng::{Counter, Purpose, Rng, open_unit_f64};
 use relt::sample::{Move, Points, Proposals, StepLaw};
@@ -65,7 +64,7 @@ fn evaluator<W: Default>(workspace: W) -> Evaluator<W> {
 /// The batch after its first evaluation.
 fn evaluated(subject: &Subject) -> Evaluator<Workspace> {
     let mut paths = evaluator(Workspace::default());
-    paths.evaluate(&Mapping::new(subject.scene(), subject.widths()), &Points::new(0));
+    paths.evaluate(&Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths()), &Points::new(0));
     paths
 }
 
@@ -123,7 +122,7 @@ fn evaluate(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let mut paths = evaluator(Workspace::default());
     let mut step = 0;
     group.bench_function("evaluate", |bencher| {
-        let mapping = Mapping::new(subject.scene(), subject.widths());
+        let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
         bencher.iter(|| {
             step += 1;
             set_step(&mut paths, step);
@@ -150,7 +149,7 @@ fn trace(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 fn shade(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let mut replayed = None;
     group.bench_function("shade", |bencher| {
-        let mapping = Mapping::new(subject.scene(), subject.widths());
+        let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
         let paths =
             replayed.get_or_insert_with(|| evaluator(Workspace::replaying(record_rays(subject.scene(), BATCHES))));
         bencher.iter(|| {
@@ -169,7 +168,7 @@ fn shade(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 /// A step that chains made: what was proposed to them and the numbers that decided.
 struct Step {
     points: Points,
-    proposed: Vec<Contribution>,
+    proposed: Contributions,
     decisions: Vec<f64>,
 }
 
@@ -189,16 +188,16 @@ fn accept(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 /// probabilities of acceptance.
 fn make(chains: &mut Walkers, step: &Step) -> [f64; 2] {
     let [mut recorded, mut accepted] = [0.0; 2];
-    for (lane, (proposed, u)) in step.proposed.iter().zip(&step.decisions).enumerate() {
-        let mut record = |state: &Contribution, weight: f64| recorded += weight * f64::from(state.rgb.x);
-        accepted += chains.step(lane, 1.0, (&step.points, lane), proposed, *u, &mut record);
+    for (lane, u) in step.decisions.iter().enumerate() {
+        let mut record = |state: Whole, weight: f64| recorded += weight * f64::from(state.main.rgb.x);
+        accepted += chains.step(lane, 1.0, (&step.points, lane), &step.proposed, *u, &mut record);
     }
     [recorded, accepted]
 }
 
 /// Chains on the luminance some time after their start, and their next steps.
 fn record_steps(subject: &Subject) -> (Walkers, Vec<Step>) {
-    let mapping = Mapping::new(subject.scene(), subject.widths());
+    let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
     let mut paths = evaluator(Workspace::default());
     let mut samples = Vec::new();
     for number in 0..STARTS {
@@ -218,7 +217,7 @@ fn record_steps(subject: &Subject) -> (Walkers, Vec<Step>) {
         let decision = |counter: &Counter| Counter { purpose: Purpose::Step, ..*counter };
         let step = Step {
             points: paths.points.clone(),
-            proposed: paths.out.lanes.clone(),
+            proposed: paths.out.clone(),
             decisions: paths.counters.iter().map(|c| open_unit_f64(paths.rng().words(decision(c), 0)[0])).collect(),
         };
         let [_, alphas] = make(&mut chains, &step);
@@ -235,16 +234,16 @@ fn splat(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let prepared = OnceCell::new();
     let mut splats = Splats::new(1);
     group.bench_function("splat", |bencher| {
-        let (lanes, film, footprint, size) = prepared.get_or_init(|| {
+        let (out, film, footprint, size) = prepared.get_or_init(|| {
             let scene = subject.scene();
             let [width, height] = [scene.film.width, scene.film.height];
             let film = Accumulator::new(width, height, 1, f64::from(scene.emitters.brightest()));
             let footprint = Footprint::new(scene.film.filter, width, height);
-            (evaluated(subject).out.lanes, film, footprint, [width as f32, height as f32])
+            (evaluated(subject).out, film, footprint, [width as f32, height as f32])
         });
         bencher.iter(|| {
             let mut recorder = Recorder { footprint, size: *size, splats: &mut splats };
-            lanes.iter().for_each(|contribution| recorder.splat(0, contribution, 1.0, 1.0));
+            (0..out.lanes.len()).for_each(|lane| recorder.splat(0, out.whole(lane), 1.0, 1.0));
             film.deposit(&mut splats);
         });
     });

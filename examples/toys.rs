@@ -155,6 +155,7 @@ fn sample(toy: &Toy, ladder: LadderChoice, combine: Combine, evaluations: u64, s
         footprint: Footprint::new(Filter::Box, COLUMNS, 1),
         size: [COLUMNS, 1],
         unit: toy.c(),
+        elsewhere: false,
         evaluations: Some(evaluations),
     });
     while sampler.sweeps_left() != Some(0) {

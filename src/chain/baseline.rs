@@ -4,7 +4,7 @@
 
 use super::{Evaluator, Recorder, Start, Target, Walkers, replay};
 use crate::{
-    path::Contribution,
+    path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -52,7 +52,7 @@ pub struct Baseline<W> {
     pub small: (f64, u64),
     /// The same of large steps.
     pub large: (f64, u64),
-    /// Σ g of the proposals of large steps: over their number, an unbiased estimate of c that is independent of the
+    /// Σ g, what they contribute elsewhere included, of the proposals of large steps: over their number, an unbiased estimate of c that is independent of the
     /// chains' first states.
     pub large_sum: f64,
 }
@@ -102,20 +102,20 @@ impl<W: Default> Baseline<W> {
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
-            let proposed = self.evaluator.out.lanes[lane];
+            let proposed = self.evaluator.out.whole(lane);
             let small = self.evaluator.moves[lane] != Move::Fresh;
             if !small {
-                self.large_sum += proposed.luminance();
-                if self.large_steps.kelemen_weights && !proposed.is_dark() {
-                    self.large_steps.record(baseline_layer::LARGE_STEPS, &proposed, 1.0, unit, recorder);
+                self.large_sum += proposed.main.luminance();
+                if self.large_steps.kelemen_weights && !proposed.main.is_dark() {
+                    self.large_steps.record(baseline_layer::LARGE_STEPS, proposed, 1.0, unit, recorder);
                 }
             }
             let u = self.decisions[lane];
             let large_steps = self.large_steps;
-            let alpha =
-                self.walkers.step(lane, 1.0, (&self.evaluator.points, lane), &proposed, u, &mut |state, weight| {
-                    large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
-                });
+            let Evaluator { points, out, .. } = &self.evaluator;
+            let alpha = self.walkers.step(lane, 1.0, (points, lane), out, u, &mut |state, weight| {
+                large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
+            });
             let count = if small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
         }
@@ -124,8 +124,9 @@ impl<W: Default> Baseline<W> {
 
     /// Records what the current states have gathered, without changing them.
     pub fn record_pending(&self, unit: f64, recorder: &mut Recorder) {
-        for (state, &weight) in self.walkers.states.iter().zip(&self.walkers.pending) {
+        for (lane, &weight) in self.walkers.pending.iter().enumerate() {
             if weight > 0.0 {
+                let state = self.walkers.whole(lane);
                 self.large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
             }
         }
@@ -154,8 +155,8 @@ impl LargeSteps {
     }
 
     /// Records f · weight / (g/ζ + p) with ζ = `unit`; without Kelemen's weights p counts as 0.
-    fn record(&self, layer: usize, state: &Contribution, weight: f64, unit: f64, recorder: &mut Recorder) {
+    fn record(&self, layer: usize, state: Whole, weight: f64, unit: f64, recorder: &mut Recorder) {
         let uniform_share = if self.kelemen_weights { self.probability } else { 0.0 };
-        recorder.splat(layer, state, unit * weight / (state.luminance() + uniform_share * unit), weight);
+        recorder.splat(layer, state, unit * weight / (state.main.luminance() + uniform_share * unit), weight);
     }
 }

@@ -1,5 +1,7 @@
 //! Where on the film chains are wanted: a weight that the scalar contribution carries.
 
+use crate::path::Whole;
+
 /// The error that a run is to make small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -41,7 +43,8 @@ const FLOOR: f64 = 0.5;
 /// Chains on g visit a pixel in proportion to its luminance I, which makes the sum of squared errors least. The relative
 /// error is least where they visit all pixels alike: with g/I (Veach 1997, section 11.5.1, and Hoberock & Hart 2010 do
 /// so for the same reason). On the scenes of the project half of all light is a lamp that is seen directly, on which
-/// chains would waste half of their time. The image is right for any W > 0.
+/// chains would waste half of their time. The image is right for any W > 0. Of a point that contributes in several
+/// places every part is weighed by where it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Importance {
     size: [f32; 2],
@@ -56,7 +59,8 @@ pub struct Importance {
 const SAMPLES_A_TILE: f64 = 128.0;
 
 impl Importance {
-    /// From what uniform points found in every pixel of a film: Σ luminance and number of points.
+    /// From what uniform points found in every pixel of a film: Σ luminance and number of points. What points found
+    /// elsewhere than at their own film positions is part of the luminance there, without a number of points.
     ///
     /// Tiles are as large as they must be to have some 128 points. A tile's luminance is the median of its rows' means, so
     /// that a sample that is much too bright does not speak for it.
@@ -81,6 +85,17 @@ impl Importance {
         Importance { size: [width as f32, height as f32], tile, columns, ln_weights: ln_weights.collect() }
     }
 
+    /// ln Σ W · luminance over all parts of a contribution whose ln g is the luminance of the whole; −∞ where there is
+    /// none.
+    #[inline(always)]
+    pub fn ln_weighed(&self, whole: Whole) -> f64 {
+        if whole.elsewhere.is_empty() {
+            return whole.main.ln_g + self.ln_at(whole.main.film);
+        }
+        // of the sum, not of its terms: one of them may be 0
+        libm::log(whole.parts().map(|part| libm::exp(self.ln_at(part.film)) * part.luminance()).sum())
+    }
+
     /// ln W at a film position, given as fractions of width and height.
     #[inline(always)]
     pub fn ln_at(&self, film: [f32; 2]) -> f64 {
@@ -92,6 +107,10 @@ impl Importance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        path::{Contribution, Elsewhere, FilmSplat},
+        scene::Rgb,
+    };
 
     #[test]
     fn bright_tiles_count_less_and_single_bright_samples_nothing() {
@@ -105,6 +124,29 @@ mod tests {
         for (x, luminance) in [(0.1, 1.0), (0.9, 100.0)] {
             let expected = -(luminance / mean + 0.5).ln();
             assert!((importance.ln_at([x, 0.1]) - expected).abs() < 1e-12, "at {x}");
+        }
+    }
+
+    #[test]
+    fn parts_of_a_contribution_are_weighed_where_they_are() {
+        let mut found = vec![[1.0, 1000.0]; 4];
+        found[3][0] = 9.0; // the tile on the lower right is bright
+        let importance = Importance::new([2, 2], &found);
+        let splat = |x: f32, value: f32| FilmSplat { film: [x, 0.75], rgb: Rgb::splat(value) };
+        let [left, right] = [0.25, 0.75].map(|x| importance.ln_at([x, 0.75]).exp());
+        assert!(left > right);
+        for (main, others, expected) in [
+            (2.0, vec![], 2.0 * left),
+            (2.0, vec![splat(0.75, 3.0), splat(0.25, 5.0)], 7.0 * left + 3.0 * right),
+            (0.0, vec![splat(0.75, 3.0)], 3.0 * right),
+            (2.0, vec![splat(0.75, 0.0)], 2.0 * left),
+            (0.0, vec![splat(0.75, 0.0)], 0.0),
+        ] {
+            let mut elsewhere = Elsewhere::new(1);
+            others.iter().for_each(|splat| elsewhere.push(0, *splat));
+            let (main, _) = Contribution::settle_whole([0.25, 0.75], Rgb::splat(main), &mut elsewhere, 0);
+            let got = importance.ln_weighed(Whole { main: &main, elsewhere: &others });
+            assert!(got == f64::NEG_INFINITY && expected == 0.0 || (got - expected.ln()).abs() < 1e-6, "{got}");
         }
     }
 

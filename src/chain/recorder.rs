@@ -2,7 +2,7 @@
 
 use crate::{
     film::{Footprint, Splat, Splats},
-    path::Contribution,
+    path::{FilmSplat, Whole},
 };
 
 /// Writes the contributions of states into the splats of a block.
@@ -16,12 +16,32 @@ pub struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// Adds `value` · f to the layer's image and `weight` to its density, at the contribution's film position.
+    /// Adds `value` · f to the layer's image, at the contribution's own film position and elsewhere, and `weight` to its
+    /// density at its own. So the density of a layer says how many samples there were, each once, where their first
+    /// dimensions lie.
+    ///
+    /// For layers that are divided by the number of all samples; see [`splat_apart`](Self::splat_apart) for others.
     #[inline(always)]
-    pub fn splat(&mut self, layer: usize, contribution: &Contribution, value: f64, weight: f64) {
-        let rgb = contribution.rgb * value as f32;
+    pub fn splat(&mut self, layer: usize, whole: Whole, value: f64, weight: f64) {
+        self.splat_apart([layer, layer], whole, value, weight);
+    }
+
+    /// [`splat`](Self::splat) with what goes elsewhere in a layer of its own, the second one, so that the pixels of the
+    /// first may be divided by the samples that they got.
+    #[inline(always)]
+    pub fn splat_apart(&mut self, [layer, elsewhere]: [usize; 2], whole: Whole, value: f64, weight: f64) {
+        self.add(layer, whole.main.splat(), value, weight);
+        for splat in whole.elsewhere {
+            self.add(elsewhere, *splat, value, 0.0);
+        }
+    }
+
+    /// Adds `value` · f to a layer's image and `weight` to its density.
+    #[inline(always)]
+    fn add(&mut self, layer: usize, splat: FilmSplat, value: f64, weight: f64) {
+        let rgb = splat.rgb * value as f32;
         let weight = weight as f32;
-        let [x, y] = [contribution.film[0] * self.size[0], contribution.film[1] * self.size[1]];
+        let [x, y] = [splat.film[0] * self.size[0], splat.film[1] * self.size[1]];
         let splats = &mut *self.splats;
         self.footprint.spread(x, y, &mut |pixel, share| {
             splats.push(layer, Splat { pixel, rgb: (rgb * share).to_array(), weight: weight * share });

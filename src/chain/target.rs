@@ -18,6 +18,11 @@ pub trait Target: Sync {
 
     /// Evaluates the proposals of all lanes that do not rest, drawing the blocks it needs.
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace);
+
+    /// Whether points may contribute elsewhere than at their own film positions.
+    fn splats_elsewhere(&self) -> bool {
+        false
+    }
 }
 
 impl Target for Mapping<'_> {
@@ -89,9 +94,9 @@ impl<W: Default> Evaluator<W> {
         };
         target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
         if let Some(importance) = &self.importance {
-            for (point, how) in self.out.lanes.iter_mut().zip(&self.moves) {
+            for (lane, how) in self.moves.iter().enumerate() {
                 if *how != Move::Rest {
-                    point.ln_g += importance.ln_at(point.film);
+                    self.out.lanes[lane].ln_g = importance.ln_weighed(self.out.whole(lane));
                 }
             }
         }

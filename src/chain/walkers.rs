@@ -1,7 +1,10 @@
 //! States of many chains.
 
 use super::acceptance;
-use crate::{path::Contribution, sample::Points};
+use crate::{
+    path::{Contribution, Contributions, Elsewhere, Whole},
+    sample::Points,
+};
 
 /// The current states of a batch of chains, each with the expected weight it has gathered and not yet recorded.
 ///
@@ -11,6 +14,8 @@ pub struct Walkers {
     pub points: Points,
     /// What it contributes there.
     pub states: Vec<Contribution>,
+    /// What it gives to the film elsewhere.
+    pub elsewhere: Elsewhere,
     /// Expected weight since the state was entered or last recorded.
     pub pending: Vec<f64>,
 }
@@ -18,11 +23,22 @@ pub struct Walkers {
 impl Walkers {
     /// `lanes` chains that wait to be put into a state.
     pub fn new(lanes: usize) -> Walkers {
-        Walkers { points: Points::new(lanes), states: vec![Contribution::NONE; lanes], pending: vec![0.0; lanes] }
+        Walkers {
+            points: Points::new(lanes),
+            states: vec![Contribution::NONE; lanes],
+            elsewhere: Elsewhere::new(lanes),
+            pending: vec![0.0; lanes],
+        }
     }
 
-    /// One Metropolis step of a chain at inverse temperature `beta` towards lane `from` of the proposals: both
-    /// states are weighted by their probabilities, whatever `u`, uniform in (0, 1), then decides.
+    /// All that a chain's state contributes.
+    #[inline(always)]
+    pub fn whole(&self, lane: usize) -> Whole<'_> {
+        Whole { main: &self.states[lane], elsewhere: self.elsewhere.of(lane) }
+    }
+
+    /// One Metropolis step of a chain at inverse temperature `beta` towards lane `from` of the proposed points and of what
+    /// they contribute: both states are weighted by their probabilities, whatever `u`, uniform in (0, 1), then decides.
     ///
     /// `record` receives states with their expected weights, once nothing more will be added to them; the weights
     /// of a step sum to one. Returns the acceptance probability.
@@ -32,41 +48,79 @@ impl Walkers {
         lane: usize,
         beta: f64,
         (points, from): (&Points, usize),
-        proposed: &Contribution,
+        proposed: &Contributions,
         u: f64,
-        record: &mut impl FnMut(&Contribution, f64),
+        record: &mut impl FnMut(Whole, f64),
     ) -> f64 {
-        let alpha = acceptance(beta, self.states[lane].ln_g, proposed.ln_g);
+        let alpha = acceptance(beta, self.states[lane].ln_g, proposed.lanes[from].ln_g);
         self.pending[lane] += 1.0 - alpha;
         if u < alpha {
             self.replace(lane, (points, from), proposed, record);
             self.pending[lane] = alpha;
         } else if alpha > 0.0 {
-            record(proposed, alpha);
+            record(proposed.whole(from), alpha);
         }
         alpha
     }
 
-    /// Puts a chain into a new state, with no weight yet; the old one is recorded.
+    /// Puts a chain into lane `from` of those points and of what they contribute, with no weight yet; the old state is
+    /// recorded.
     #[inline(always)]
     pub fn replace(
         &mut self,
         lane: usize,
         (points, from): (&Points, usize),
-        state: &Contribution,
-        record: &mut impl FnMut(&Contribution, f64),
+        out: &Contributions,
+        record: &mut impl FnMut(Whole, f64),
     ) {
         self.flush(lane, record);
         self.points.copy(lane, points, from);
-        self.states[lane] = *state;
+        self.states[lane] = out.lanes[from];
+        self.elsewhere.copy(lane, &out.elsewhere, from);
     }
 
     /// Records what the chain's state has gathered.
     #[inline(always)]
-    pub fn flush(&mut self, lane: usize, record: &mut impl FnMut(&Contribution, f64)) {
+    pub fn flush(&mut self, lane: usize, record: &mut impl FnMut(Whole, f64)) {
         let weight = std::mem::replace(&mut self.pending[lane], 0.0);
         if weight > 0.0 {
-            record(&self.states[lane], weight);
+            record(self.whole(lane), weight);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{path::FilmSplat, scene::Rgb};
+
+    /// Lane i contributes i + 1 at its own place and i times 1 elsewhere.
+    fn proposed() -> Contributions {
+        let mut out = Contributions::new(3);
+        for lane in 0..3 {
+            (0..lane).for_each(|_| out.elsewhere.push(lane, FilmSplat { film: [0.5; 2], rgb: Rgb::splat(1.0) }));
+            let rgb = Rgb::splat(lane as f32 + 1.0);
+            out.lanes[lane] = Contribution::settle_whole([0.0; 2], rgb, &mut out.elsewhere, lane).0;
+        }
+        out
+    }
+
+    #[test]
+    fn what_a_state_gives_elsewhere_comes_and_goes_with_it() {
+        let (points, out) = (Points::new(3), proposed());
+        let mut walkers = Walkers::new(1);
+        let mut seen = Vec::new();
+        let mut record = |whole: Whole, weight: f64| seen.push((whole.main.rgb.x, whole.elsewhere.len(), weight));
+        walkers.replace(0, (&points, 2), &out, &mut record);
+        // from 5 to 1 with α = 1/5, refused; to 3 with α = 3/5, accepted; to nothing
+        assert!((walkers.step(0, 1.0, (&points, 0), &out, 0.9, &mut record) - 0.2).abs() < 1e-6);
+        assert!((walkers.step(0, 1.0, (&points, 1), &out, 0.5, &mut record) - 0.6).abs() < 1e-6);
+        walkers.flush(0, &mut record);
+        let expected = [(1.0, 0, 0.2), (3.0, 2, 1.2), (2.0, 1, 0.6)];
+        assert_eq!(seen.len(), expected.len(), "{seen:?}");
+        for (got, expected) in seen.iter().zip(expected) {
+            assert_eq!((got.0, got.1), (expected.0, expected.1), "{seen:?}");
+            assert!((got.2 - expected.2).abs() < 1e-6, "{seen:?}");
         }
     }
 }

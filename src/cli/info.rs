@@ -89,7 +89,7 @@ fn film(film: &FilmDescription) -> Vec<String> {
         format!(
             "memory: {:.1} MiB for path and mlt, {:.1} MiB for re",
             mebibytes(1),
-            mebibytes(Layers::of(&Choices::default(), 2).count)
+            mebibytes(Layers::of(&Choices::default(), 2, false).count)
         ),
     ]
 }

@@ -66,6 +66,12 @@ impl Contribution {
         f64::from(self.luminance)
     }
 
+    /// What the point adds at its own film position.
+    #[inline(always)]
+    pub fn splat(&self) -> FilmSplat {
+        FilmSplat { film: self.film, rgb: self.rgb }
+    }
+
     /// Whether nothing is contributed.
     #[inline(always)]
     pub fn is_dark(&self) -> bool {
@@ -92,6 +98,14 @@ pub struct FilmSplat {
     pub film: [f32; 2],
     /// f there.
     pub rgb: Rgb,
+}
+
+impl FilmSplat {
+    /// Luminance of f there.
+    #[inline(always)]
+    pub fn luminance(&self) -> f64 {
+        f64::from(luminance(self.rgb))
+    }
 }
 
 /// What the points of a batch give to the film elsewhere than at the position that their first dimensions name: light
@@ -177,6 +191,14 @@ pub struct Whole<'a> {
     pub main: &'a Contribution,
     /// Elsewhere.
     pub elsewhere: &'a [FilmSplat],
+}
+
+impl<'a> Whole<'a> {
+    /// What it adds to each place of the film, its own position first.
+    #[inline(always)]
+    pub fn parts(self) -> impl Iterator<Item = FilmSplat> + use<'a> {
+        std::iter::once(self.main.splat()).chain(self.elsewhere.iter().copied())
+    }
 }
 
 /// Contributions of a batch, one a lane, and counts of what evaluating them took.

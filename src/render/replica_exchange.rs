@@ -5,6 +5,7 @@ use super::{
     settings::{Method, Settings},
 };
 use crate::{
+    chain::Target,
     film::Footprint,
     path::Workspace,
     tempering::{Choices, LadderChoice, Learning, RoundReport, Sampler, Setup},
@@ -29,6 +30,7 @@ impl ReplicaExchange {
             footprint: Footprint::new(film.filter, film.width, film.height),
             size: stage.size(),
             unit: f64::from(stage.mapping.scene().emitters.brightest()),
+            elsewhere: stage.mapping.splats_elsewhere(),
             evaluations: mutations,
         };
         ReplicaExchange { sampler: Sampler::new(setup) }

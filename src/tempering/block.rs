@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     chain::{Evaluator, Importance, Start, Target, Walkers, replay},
-    path::Contribution,
+    path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -223,8 +223,8 @@ impl<W: Default + Send> Block<W> {
             let ladder = i / self.offers;
             let lane = ladder * self.chains + usize::from(self.replica_on[ladder * self.chains]);
             let ((from, at), (to, place)) = (self.place(replicas + i), self.place(lane));
-            let point = self.parts[from].evaluator.out.lanes[at];
-            let alpha = swap_acceptance(0.0, point.ln_g, lowest, self.parts[to].walkers.states[place].ln_g);
+            let ln_offered = self.parts[from].evaluator.out.lanes[at].ln_g;
+            let alpha = swap_acceptance(0.0, ln_offered, lowest, self.parts[to].walkers.states[place].ln_g);
             self.parts[to].tally.counts[1].swaps.add(alpha);
             if alpha == 0.0 {
                 continue;
@@ -235,13 +235,13 @@ impl<W: Default + Send> Block<W> {
                 self.trips.renewed(lane);
                 if from == to {
                     let Part { walkers, evaluator, tally, .. } = &mut self.parts[to];
-                    let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, 1, state, w);
-                    walkers.replace(place, (&evaluator.points, at), &point, &mut record);
+                    let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+                    walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
                 } else {
                     let parts = self.parts.get_disjoint_mut([from, to]).expect("two parts");
                     let [Part { evaluator, .. }, Part { walkers, tally, .. }] = parts;
-                    let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, 1, state, w);
-                    walkers.replace(place, (&evaluator.points, at), &point, &mut record);
+                    let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+                    walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
                 }
             }
         }
@@ -290,7 +290,7 @@ impl<W: Default + Send> Block<W> {
         for part in &self.parts {
             for (at, &weight) in part.walkers.pending.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
                 let k = usize::from(self.rung[part.lanes.start + at]);
-                tally.state(canvas, round, k, &part.walkers.states[at], weight);
+                tally.state(canvas, round, k, part.walkers.whole(at), weight);
             }
         }
     }
@@ -394,11 +394,10 @@ impl<W: Default> Part<W> {
         let half = usize::from(sweep >= round.half);
         for at in 0..self.replicas {
             let k = usize::from(rung[self.lanes.start + at]);
-            let proposed = evaluator.out.lanes[at];
             let beta = round.ladder.betas()[k];
             let u = open_unit_f64(self.decision[at]);
-            let mut record = |state: &Contribution, w: f64| tally.state(canvas, round, k, state, w);
-            let alpha = walkers.step(at, beta, (&evaluator.points, at), &proposed, u, &mut record);
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = walkers.step(at, beta, (&evaluator.points, at), &evaluator.out, u, &mut record);
             let counts = &mut tally.counts[k];
             counts.steps[usize::from(self.scale[at])].add(alpha);
             let [sum, weight] = &mut counts.halves[half];
@@ -406,8 +405,8 @@ impl<W: Default> Part<W> {
             self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
-        for point in &evaluator.out.lanes[self.replicas..] {
-            tally.uniform_point(canvas, round, point, false);
+        for at in self.replicas..evaluator.out.lanes.len() {
+            tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
         }
     }
 }

@@ -74,9 +74,10 @@ impl<W: Default> Independent<W> {
             self.evaluator.moves[lanes..].fill(Move::Rest);
             self.evaluator.counters[..lanes].iter_mut().zip(&mut counters).for_each(|(c, next)| *c = next);
             self.evaluator.evaluate(target, &self.nowhere);
-            for (point, counter) in self.evaluator.out.lanes[..lanes].iter().zip(&self.evaluator.counters) {
+            for (lane, counter) in self.evaluator.counters[..lanes].iter().enumerate() {
+                let point = self.evaluator.out.whole(lane);
                 tally.uniform_point(canvas, round, point, true);
-                keep(Start { counter: *counter, ln_g: point.ln_g });
+                keep(Start { counter: *counter, ln_g: point.main.ln_g });
             }
             left -= lanes;
             next += lanes as u64;

@@ -41,5 +41,5 @@ pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungR
 pub use sampler::{Development, Learning, Learnt, Sampler, Setup};
 pub use stepping::stepping_stones;
 pub use steps::StepMix;
-pub use tally::{Canvas, Layers, PointGroups, Round, RungCounts, Sum, Tally};
+pub use tally::{Canvas, Layers, PointGroups, PointLayer, Round, RungCounts, Sum, Tally};
 pub use weights::Weights;

@@ -3,6 +3,11 @@
 //! Separate halves of the samples fill separate films, so the difference of the halves shows the error of the image as it
 //! is, correlations of chains and evenness of points included. Ladders are halved by blocks, stratified points by time:
 //! halves of a sequence of low discrepancy that follow one another are as even as the whole.
+//!
+//! What a point gives elsewhere than at its own film position counts in the probe there, as if it were of another point:
+//! squares of what one point adds to one pixel in several parts lack the products of these parts. The number of points
+//! that it is divided by, in the end, is that of the probe's own, which differs from the mean over all pixels by its
+//! noise only.
 
 use crate::film::{Accumulator, Splat, Splats};
 
@@ -80,12 +85,13 @@ impl Probes {
         Splats::new(2 * RATIOS.len())
     }
 
-    /// What a uniform point adds for each ratio, and what its square counts in the most evenly weighed mean.
+    /// What a uniform point adds for each ratio, and what its square counts in the most evenly weighed mean. `points` is
+    /// the number of points that this counts for: 1, or 0 for what comes from a point elsewhere.
     #[inline(always)]
-    pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64, even: f64) {
+    pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64, even: f64, points: f32) {
         for (layer, ratio) in RATIOS.into_iter().enumerate() {
             let value = value(ratio);
-            splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight: 1.0 });
+            splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight: points });
             let rgb = [value * value, even * value * value, 0.0].map(|v| v as f32);
             splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
         }

@@ -11,19 +11,38 @@ use super::{
 use crate::{
     chain::Recorder,
     film::{Accumulator, Footprint, Splats},
-    path::Contribution,
+    path::Whole,
 };
+
+/// A layer of uniform points, of which every pixel is divided by the number of points that it got, with what points gave
+/// to other places than their own: that is divided by the number of all points and so needs a layer for itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointLayer {
+    /// f of points where they lie on the film, and their number.
+    pub own: usize,
+    /// f elsewhere; absent where points have no such thing.
+    pub elsewhere: Option<usize>,
+}
+
+impl PointLayer {
+    /// Records a point.
+    #[inline(always)]
+    fn splat(self, recorder: &mut Recorder, point: Whole, value: f64, weight: f64) {
+        debug_assert!(self.elsewhere.is_some() || point.elsewhere.is_empty(), "the set-up promised nothing elsewhere");
+        recorder.splat_apart([self.own, self.elsewhere.unwrap_or(self.own)], point, value, weight);
+    }
+}
 
 /// Layers of the film, those that the settings need. Others cost nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layers {
     /// f of uniform points: the uniform rung's own image E_u.
-    pub uniform: Option<usize>,
+    pub uniform: Option<PointLayer>,
     /// f of stratified points: the image of a path tracer, as long as it may be the best. Also where chains are wanted
     /// follows from it.
-    pub even: Option<usize>,
+    pub even: Option<PointLayer>,
     /// What uniform points add to the balanced image.
-    pub hot: Option<usize>,
+    pub hot: Option<PointLayer>,
     /// What tempered states add to the balanced image, in the unit of [`Weights`].
     pub tempered: Option<usize>,
     /// f/g of states on the target: the target's own image E_e, in the unit of [`Weights`].
@@ -35,8 +54,9 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// The layers that those choices need, with room for the parts of `most_rungs`.
-    pub fn of(choices: &Choices, most_rungs: usize) -> Layers {
+    /// The layers that those choices need, with room for the parts of `most_rungs` and, if wanted, for what points give
+    /// `elsewhere`.
+    pub fn of(choices: &Choices, most_rungs: usize, elsewhere: bool) -> Layers {
         let mut count = 0;
         let mut layer = |wanted: bool, layers: usize| {
             wanted.then(|| {
@@ -44,13 +64,20 @@ impl Layers {
                 count - layers
             })
         };
+        let mut points = |wanted: bool| layer(wanted, 1).map(|own| PointLayer { own, elsewhere: layer(elsewhere, 1) });
         let pair = !matches!(choices.combine, Combine::Balance | Combine::Target | Combine::Uniform);
         let balance = choices.combine == Combine::Balance || choices.layers;
         let chains = most_rungs > 1;
+        let [uniform, even, hot] = [
+            choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance,
+            balance,
+            balance && chains,
+        ]
+        .map(&mut points);
         let layers = Layers {
-            uniform: layer(choices.layers || pair || choices.combine == Combine::Uniform || !chains && !balance, 1),
-            even: layer(balance, 1),
-            hot: layer(balance && chains, 1),
+            uniform,
+            even,
+            hot,
             tempered: layer(balance && chains, 1),
             target: layer((choices.layers || pair || choices.combine == Combine::Target) && chains, 1),
             rungs: layer(choices.layers && chains, most_rungs.saturating_sub(1)),
@@ -161,11 +188,11 @@ impl PointGroups {
 impl Canvas<'_> {
     /// The probe at a film position.
     #[inline(always)]
-    fn probe(&self, point: &Contribution) -> Option<u32> {
+    fn probe(&self, film: [f32; 2]) -> Option<u32> {
         let (map, _) = self.probes?;
         let [x, y] = [0, 1].map(|i| {
             let extent = self.size[i];
-            ((point.film[i] * extent as f32) as u32).min(extent - 1)
+            ((film[i] * extent as f32) as u32).min(extent - 1)
         });
         map.of_pixel(y * self.size[0] + x)
     }
@@ -250,55 +277,62 @@ impl Tally {
     /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind, where there
     /// are any: offered ones are noisier.
     #[inline(always)]
-    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: &Contribution, stratified: bool) {
-        self.histograms[0].add(point.ln_g, 1.0);
-        let mixture = if point.is_dark() { 0.0 } else { round.weights.mixture(point.ln_g) };
+    pub fn uniform_point(&mut self, canvas: &Canvas, round: &Round, point: Whole, stratified: bool) {
+        let luminance = point.main.luminance();
+        self.histograms[0].add(point.main.ln_g, 1.0);
+        let mixture = if point.main.is_dark() { 0.0 } else { round.weights.mixture(point.main.ln_g) };
         let size = canvas.size.map(|n| n as f32);
         let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
         if let Some(layer) = canvas.layers.uniform {
-            recorder.splat(layer, point, 1.0, 1.0);
+            layer.splat(&mut recorder, point, 1.0, 1.0);
         }
         if let Some(layer) = canvas.layers.even.filter(|_| stratified) {
-            recorder.splat(layer, point, 1.0, 1.0);
+            layer.splat(&mut recorder, point, 1.0, 1.0);
         }
         if stratified {
-            self.even.add(point.luminance() / canvas.unit, 1.0);
+            self.even.add(luminance / canvas.unit, 1.0);
         }
         if let Some(layer) = canvas.layers.hot {
             let [effort, _] = round.effort;
             let share = effort * round.weights.uniform(mixture);
-            recorder.splat(layer, point, share, effort);
-            self.counts[0].luminance += share * point.luminance();
-            self.hot.add(share * point.luminance() / canvas.unit, effort);
+            layer.splat(&mut recorder, point, share, effort);
+            self.counts[0].luminance += share * luminance;
+            self.hot.add(share * luminance / canvas.unit, effort);
         }
-        if let Some(probe) = canvas.probe(point).filter(|_| stratified || round.only_offers) {
-            let g = point.luminance();
-            let value = |ratio| g * round.weights.uniform_with(ratio, mixture);
-            Probes::uniform(&mut self.probes, probe, value, round.weights.uniform_with(1.0, mixture));
+        if stratified || round.only_offers {
+            for (part, points) in point.parts().zip(std::iter::once(1.0).chain(std::iter::repeat(0.0))) {
+                let Some(probe) = canvas.probe(part.film) else { continue };
+                let g = part.luminance();
+                let value = |ratio| g * round.weights.uniform_with(ratio, mixture);
+                Probes::uniform(&mut self.probes, probe, value, round.weights.uniform_with(1.0, mixture), points);
+            }
         }
     }
 
     /// Records a state on tempered rung `k`, counted from 1, with its expected weight.
     #[inline(always)]
-    pub fn state(&mut self, canvas: &Canvas, round: &Round, k: usize, state: &Contribution, weight: f64) {
-        self.histograms[k].add(state.ln_g, weight);
+    pub fn state(&mut self, canvas: &Canvas, round: &Round, k: usize, state: Whole, weight: f64) {
+        let ln_g = state.main.ln_g;
+        self.histograms[k].add(ln_g, weight);
         let size = canvas.size.map(|n| n as f32);
         let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
         if let Some(layer) = canvas.layers.target.filter(|_| k + 1 == round.ladder.rungs()) {
-            recorder.splat(layer, state, round.weights.target(state.ln_g) * weight, weight);
+            recorder.splat(layer, state, round.weights.target(ln_g) * weight, weight);
         }
         let Some(layer) = canvas.layers.tempered else { return };
-        let mixture = round.weights.mixture(state.ln_g);
+        let mixture = round.weights.mixture(ln_g);
         let [_, effort] = round.effort;
         let value = effort * weight * round.weights.tempered(mixture);
         recorder.splat(layer, state, value, effort * weight);
         if let Some(first) = canvas.layers.rungs {
             recorder.splat(first + k - 1, state, value, effort * weight);
         }
-        self.counts[k].luminance += value * state.luminance();
-        self.tempered.add(value * state.luminance() / canvas.unit, effort * weight);
-        if let Some(probe) = canvas.probe(state) {
-            let g = state.luminance();
+        let luminance = state.main.luminance();
+        self.counts[k].luminance += value * luminance;
+        self.tempered.add(value * luminance / canvas.unit, effort * weight);
+        for part in state.parts() {
+            let Some(probe) = canvas.probe(part.film) else { continue };
+            let g = part.luminance();
             let value = |ratio| g * round.weights.tempered_with(ratio, mixture);
             let uniform = |ratio| g * round.weights.uniform_with(ratio, mixture);
             let even = round.weights.tempered_with(1.0, mixture);
@@ -318,5 +352,84 @@ impl Tally {
     /// Empties the counts of a round.
     pub fn reset_counts(&mut self) {
         self.counts.fill(RungCounts::default());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        film::Filter,
+        path::{Contribution, Elsewhere, FilmSplat},
+        scene::Rgb,
+        tempering::probes::EVEN,
+    };
+
+    /// A film of two pixels, probed both, and a point that gives 1 to the first, where it lies, and 1 + 2 to the second:
+    /// g = 4, so that with ζ = ρ = 1 it counts 1/5 in the balanced image.
+    #[test]
+    fn parts_of_a_point_go_where_they_belong_and_count_as_one_point() {
+        let (map, footprint, groups) = (ProbeMap::new([2, 1]), Footprint::new(Filter::Box, 2, 1), PointGroups::new(1));
+        let layers = Layers::of(&Choices::default(), 2, true);
+        let (film, probes) = (Accumulator::new(2, 1, layers.count, 1.0), Probes::new(&map, 1.0));
+        let canvas = Canvas {
+            footprint: &footprint,
+            size: [2, 1],
+            film: &film,
+            unit: 1.0,
+            layers,
+            probes: Some((&map, &probes)),
+            groups: &groups,
+        };
+        let ladder = Ladder::even(2);
+        let round = Round {
+            weights: Weights::new(&ladder, &[0.0; 2], 1.0, 0.0),
+            ladder,
+            mixes: std::array::from_fn(|_| Vec::new()),
+            effort: [2.0, 0.5],
+            only_offers: false,
+            half: u64::MAX,
+        };
+        let mut elsewhere = Elsewhere::new(1);
+        for value in [1.0, 2.0] {
+            elsewhere.push(0, FilmSplat { film: [0.75, 0.5], rgb: Rgb::splat(value) });
+        }
+        let (main, _) = Contribution::settle_whole([0.25, 0.5], Rgb::splat(1.0), &mut elsewhere, 0);
+        let whole = Whole { main: &main, elsewhere: elsewhere.of(0) };
+        let mut tally = Tally::new(2, layers.count);
+        tally.uniform_point(&canvas, &round, whole, true);
+        tally.state(&canvas, &round, 1, whole, 0.5);
+        tally.deposit(&canvas, 0, None);
+
+        // value and weight of both pixels
+        let near = |got: [[f64; 2]; 2], expected: [[f64; 2]; 2], what: &str| {
+            let close = got.as_flattened().iter().zip(expected.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-6);
+            assert!(close, "{what}: {got:?} in the place of {expected:?}");
+        };
+        let layer = |layer: usize| [0, 1].map(|i| [film.layer(layer)[i][0], film.layer(layer)[i][3]]);
+        let (even, hot) = (layers.even.unwrap(), layers.hot.unwrap());
+        near(layer(even.own), [[1.0, 1.0], [0.0, 0.0]], "stratified points");
+        near(layer(even.elsewhere.unwrap()), [[0.0, 0.0], [3.0, 0.0]], "what they give elsewhere");
+        near(layer(hot.own), [[0.4, 2.0], [0.0, 0.0]], "balanced points");
+        near(layer(hot.elsewhere.unwrap()), [[0.0, 0.0], [1.2, 0.0]], "what they give elsewhere");
+        near(layer(layers.tempered.unwrap()), [[0.05, 0.25], [0.15, 0.0]], "states");
+        let probed = |ratio, of: [usize; 2]| [0, 1].map(|probe| of.map(|i| probes.sums(ratio)[probe][0][i]));
+        near(probed(0, [0, 2]), [[1.0, 1.0], [3.0, 0.0]], "points and their number in probes");
+        near(probed(EVEN, [1, 3]), [[0.1, 0.02], [0.3, 0.5 * (0.04 + 0.16)]], "states and their squares in probes");
+        assert!((tally.counts[0].luminance - 1.6).abs() < 1e-6 && (tally.counts[1].luminance - 0.2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn layers_for_what_goes_elsewhere_are_there_only_if_wanted() {
+        for layers in [false, true] {
+            for combine in Combine::ALL {
+                let choices = Choices { combine, layers, ..Choices::default() };
+                let [without, with] = [false, true].map(|elsewhere| Layers::of(&choices, 3, elsewhere));
+                let points = |layers: Layers| [layers.uniform, layers.even, layers.hot].into_iter().flatten();
+                assert_eq!(with.count - without.count, points(with).count());
+                assert!(points(without).all(|layer| layer.elsewhere.is_none()));
+                assert!(points(with).all(|layer| layer.elsewhere.is_some()));
+            }
+        }
     }
 }

@@ -2,12 +2,14 @@
 
 use rayon::ThreadPoolBuilder;
 use relt::{
+    chain::Target,
     film::Image,
     rng::Rng,
     tempering::{Block, Choices, Combine, Histogram, Ladder, RungCounts},
 };
 
 use crate::{
+    elsewhere::Scattered,
     support::{Stage, exact_draws, replicas, sampler, two_peaks},
     toys::Toy,
 };
@@ -93,24 +95,30 @@ fn looking_at_the_picture_changes_nothing() {
     assert!(looked == not);
 }
 
-/// What a block of ladders records in 40 sweeps in parts of `lanes_a_part`: film, histograms, counts, round trips.
-fn block(lanes_a_part: usize, threads: usize) -> (Vec<[f64; 4]>, Vec<Histogram>, Vec<RungCounts>, [u64; 2]) {
+/// What a block of ladders on a target with g ≤ `largest` records in 40 sweeps in parts of `lanes_a_part`: film, histograms,
+/// counts, round trips.
+fn block<T: Target>(
+    target: &T,
+    largest: f64,
+    lanes_a_part: usize,
+    threads: usize,
+) -> (Vec<[f64; 4]>, Vec<Histogram>, Vec<RungCounts>, [u64; 2]) {
     const LADDERS: usize = 5;
-    let (toy, rng) = (two_peaks(), Rng::new(3));
+    let rng = Rng::new(3);
     let ladder = Ladder::new(vec![0.0, 0.1, 0.3, 0.6, 1.0]);
-    let mut stage = Stage::new(ladder, &[0.0, -0.5, -1.2, -2.0, -3.0], 16);
+    let mut stage = Stage::new(ladder, &[0.0, -0.5, -1.2, -2.0, -3.0], 16, target.splats_elsewhere());
     stage.round.half = 20;
     let (canvas, round) = (stage.canvas(), &stage.round);
     let starts: Vec<_> =
-        (1..5).map(|k| exact_draws(&toy, round.ladder.betas()[k], 4.1, LADDERS, rng, k as u32)).collect();
+        (1..5).map(|k| exact_draws(target, round.ladder.betas()[k], largest, LADDERS, rng, k as u32)).collect();
     let starts: Vec<_> = starts.iter().map(Vec::as_slice).collect();
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     pool.install(|| {
         let mut block = Block::new(rng, (0, LADDERS), 5, 2, lanes_a_part, stage.layers.count, [16, 1]);
-        block.start(&toy, &starts);
-        block.advance(&toy, 20, &canvas, round);
+        block.start(target, &starts);
+        block.advance(target, 20, &canvas, round);
         block.set_offers(rng, 3);
-        block.advance(&toy, 20, &canvas, round);
+        block.advance(target, 20, &canvas, round);
         block.flush(&canvas, round);
         block.deposit(&canvas);
         let mut histograms = vec![Histogram::default(); 5];
@@ -126,11 +134,16 @@ fn block(lanes_a_part: usize, threads: usize) -> (Vec<[f64; 4]>, Vec<Histogram>,
 
 #[test]
 fn parts_of_a_block_do_not_change_a_bit() {
-    let whole = block(512, 1);
+    parts_do_not_matter(&two_peaks(), 4.1);
+    parts_do_not_matter(&Scattered, Scattered::LARGEST);
+}
+
+fn parts_do_not_matter<T: Target>(target: &T, largest: f64) {
+    let whole = block(target, largest, 512, 1);
     assert!(whole.3[1] > 0, "some state climbs the ladder");
     for lanes_a_part in [1, 3, 4, 7, 16, 29, 30] {
         for threads in [1, 2] {
-            let parts = block(lanes_a_part, threads);
+            let parts = block(target, largest, lanes_a_part, threads);
             assert!(parts.0 == whole.0, "film, {lanes_a_part} lanes a part, {threads} threads");
             assert!(parts.1 == whole.1, "histograms, {lanes_a_part} lanes a part, {threads} threads");
             assert_eq!(parts.2, whole.2, "counts, {lanes_a_part} lanes a part, {threads} threads");

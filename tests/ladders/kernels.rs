@@ -45,10 +45,9 @@ fn walk<T: Target>(target: &T, starts: &[Start], beta: f64, step: Move, steps: u
         evaluator.counters.iter_mut().for_each(|c| c.step = number);
         evaluator.evaluate(target, &walkers.points);
         for lane in 0..starts.len() {
-            let proposed = evaluator.out.lanes[lane];
             let decision = Counter { purpose: Purpose::Step, ..evaluator.counters[lane] };
             let u = open_unit_f64(rng.words(decision, 0)[0]);
-            walkers.step(lane, beta, (&evaluator.points, lane), &proposed, u, &mut |_, _| {});
+            walkers.step(lane, beta, (&evaluator.points, lane), &evaluator.out, u, &mut |_, _| {});
         }
     }
     before.into_iter().zip(places(&walkers)).map(|(before, after)| [before, after]).collect()
@@ -171,7 +170,7 @@ fn sweeps_leave_every_rung_as_it_was() {
     for (offers, betas) in [(1, vec![0.0, 1.0]), (1, vec![0.0, 0.4, 1.0]), (5, vec![0.0, 0.1, 0.3, 0.6, 1.0])] {
         let ladder = Ladder::new(betas);
         let rungs = ladder.rungs();
-        let stage = Stage::new(ladder, &vec![0.0; rungs], 1);
+        let stage = Stage::new(ladder, &vec![0.0; rungs], 1, false);
         let (canvas, round) = (stage.canvas(), &stage.round);
         let draws: Vec<Vec<Start>> = (1..rungs)
             .map(|k| {

@@ -2,6 +2,7 @@
 
 mod baseline;
 mod bits;
+mod elsewhere;
 mod exact;
 mod images;
 mod kernels;

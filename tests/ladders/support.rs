@@ -102,6 +102,7 @@ pub fn sampler<T: Target>(choices: Choices, columns: u32, evaluations: u64, seed
         footprint: Footprint::new(Filter::Box, columns, 1),
         size: [columns, 1],
         unit: 1.0,
+        elsewhere: false,
         evaluations: Some(evaluations),
     })
 }
@@ -162,10 +163,10 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// For that ladder, with weights as if ln Z were `ln_z`.
-    pub fn new(ladder: Ladder, ln_z: &[f64], columns: u32) -> Stage {
+    /// For that ladder, with weights as if ln Z were `ln_z`, and with layers for what points give elsewhere if wanted.
+    pub fn new(ladder: Ladder, ln_z: &[f64], columns: u32, elsewhere: bool) -> Stage {
         let rungs = ladder.rungs();
-        let layers = Layers::of(&replicas(rungs as u32, Combine::Balance), rungs);
+        let layers = Layers::of(&replicas(rungs as u32, Combine::Balance), rungs, elsewhere);
         let mixes = vec![StepMix::about(2.0); rungs];
         Stage {
             footprint: Footprint::new(Filter::Box, columns, 1),

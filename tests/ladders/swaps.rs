@@ -72,7 +72,7 @@ fn rungs_are_placed_at_equal_rejection() {
 fn trips(ladders: usize, rungs: usize, sweeps: u64) -> [u64; 2] {
     let (target, rng) = (Square(|_, _| 3.0), Rng::new(1));
     let ladder = Ladder::even(rungs);
-    let stage = Stage::new(ladder, &vec![0.0; rungs], 1);
+    let stage = Stage::new(ladder, &vec![0.0; rungs], 1, false);
     let (canvas, round) = (stage.canvas(), &stage.round);
     let starts = exact_draws(&target, 1.0, 3.1, ladders, rng, 0);
     let mut block = Block::new(rng, (0, ladders), rungs, 1, 512, stage.layers.count, [1, 1]);

@@ -3,7 +3,7 @@
 use super::{Learnt, Sampler};
 use crate::{
     film::{Footprint, Heuristic, Image, Plane, Splats},
-    tempering::{Combine, Histogram, Tally},
+    tempering::{Combine, Histogram, PointLayer, Tally},
 };
 
 /// What there is to show at some moment.
@@ -83,28 +83,45 @@ impl<W: Default + Send> Planes<'_, W> {
 
     /// All rungs together: the mean over each pixel's uniform points, plus the tempered states.
     fn balance(&self) -> Image {
-        let hot = self.sums(self.sampler.screen.layers.hot).expect("a layer of the balanced image");
+        let hot = self.hot();
         let tempered = self.sums(self.sampler.screen.layers.tempered);
-        let (mean, scale) = (self.hot_means(&hot), self.tempered_scale());
+        let scale = self.tempered_scale();
         self.image(|i| {
-            let hot = mean.of(&hot[i]);
+            let hot = hot.of(i);
             [0, 1, 2].map(|ch| hot[ch] + tempered.as_ref().map_or(0.0, |sums| sums[i][ch] * scale))
         })
     }
 
     /// The mean over each pixel's stratified points.
     fn even(&self) -> Image {
-        let sums = self.sums(self.sampler.screen.layers.even).expect("a layer of stratified points");
+        let layer = self.sampler.screen.layers.even.expect("a layer of stratified points");
         let [stratified, _] = self.sampler.points;
-        let mean = PixelMeans::new(&sums, [stratified, 0], &self.sampler.screen.footprint);
-        self.image(|i| mean.of(&sums[i]))
+        let points = self.points(layer, [stratified, 0], stratified as f64);
+        self.image(|i| points.of(i))
     }
 
     /// E_u.
     fn uniform(&self) -> Image {
-        let sums = self.sums(self.sampler.screen.layers.uniform).expect("a layer of uniform points");
-        let mean = PixelMeans::new(&sums, self.sampler.points, &self.sampler.screen.footprint);
-        self.image(|i| mean.of(&sums[i]))
+        let layer = self.sampler.screen.layers.uniform.expect("a layer of uniform points");
+        let [stratified, offered] = self.sampler.points;
+        let points = self.points(layer, [stratified, offered], (stratified + offered) as f64);
+        self.image(|i| points.of(i))
+    }
+
+    /// What uniform points add to the balanced image: those since chains started.
+    fn hot(&self) -> PointImage {
+        let layer = self.sampler.screen.layers.hot.expect("a layer of the balanced image");
+        let [stratified, offered] = self.sampler.points;
+        // a round's points share its evaluations among them as their effort, so all of them sum to all of these
+        self.points(layer, [stratified - self.sampler.bootstrap, offered], self.sampler.effort)
+    }
+
+    /// Of a layer with so many stratified and offered points, of weight `weight` all together.
+    fn points(&self, layer: PointLayer, points: [u64; 2], weight: f64) -> PointImage {
+        let own = self.sampler.screen.film.layer_with(layer.own, self.pending);
+        let means = PixelMeans::new(&own, points, &self.sampler.screen.footprint);
+        let scale = if weight > 0.0 { self.pixels() / weight } else { 0.0 };
+        PointImage { own, means, elsewhere: self.sums(layer.elsewhere).map(|sums| (sums, scale)) }
     }
 
     /// E_e.
@@ -121,17 +138,13 @@ impl<W: Default + Send> Planes<'_, W> {
     /// image; the parts sum to it.
     fn layers(&self) -> Vec<(String, Plane)> {
         let on = &self.sampler.screen.layers;
-        let [hot, tempered] = [on.hot, on.tempered].map(|layer| self.sums(layer));
-        let main = hot
-            .clone()
-            .or_else(|| self.sums(on.even))
-            .or_else(|| self.sums(on.uniform))
-            .or_else(|| self.sums(on.target))
-            .unwrap_or_default();
+        let tempered = self.sums(on.tempered);
+        let of_points = on.hot.or(on.even).or(on.uniform).map(|layer| layer.own);
+        let main = self.sums(of_points.or(on.target)).unwrap_or_default();
         let density =
             main.iter().enumerate().map(|(i, sums)| (sums[3] + tempered.as_ref().map_or(0.0, |t| t[i][3])) as f32);
         let mut layers = vec![("density".to_owned(), Plane::Gray(density.collect()))];
-        if !self.sampler.choices.layers || hot.is_none() {
+        if !self.sampler.choices.layers || on.hot.is_none() {
             return layers;
         }
         layers.push(("uniform".into(), Plane::Rgb(self.uniform())));
@@ -139,9 +152,8 @@ impl<W: Default + Send> Planes<'_, W> {
             return layers;
         }
         layers.push(("target".into(), Plane::Rgb(self.target())));
-        let hot = hot.unwrap_or_default();
-        let mean = self.hot_means(&hot);
-        layers.push(("rung1".into(), Plane::Rgb(self.image(|i| mean.of(&hot[i])))));
+        let hot = self.hot();
+        layers.push(("rung1".into(), Plane::Rgb(self.image(|i| hot.of(i)))));
         let scale = self.tempered_scale();
         for k in 1..self.sampler.round.ladder.rungs() {
             let sums = self.sums(on.rungs.map(|first| first + k - 1)).unwrap_or_default();
@@ -150,12 +162,28 @@ impl<W: Default + Send> Planes<'_, W> {
         }
         layers
     }
+}
 
-    /// Means over the points since chains started.
-    fn hot_means(&self, sums: &[[f64; 4]]) -> PixelMeans {
-        let [stratified, offered] = self.sampler.points;
-        let points = [stratified - self.sampler.bootstrap, offered];
-        PixelMeans::new(sums, points, &self.sampler.screen.footprint)
+/// An image of uniform points: where they lie, the mean over the points of each pixel; elsewhere, the sum times the number
+/// of pixels over the number (or weight) of all points.
+///
+/// What a pixel gets from elsewhere comes from points of all pixels, so the number of its own points says nothing about
+/// it. While stratified points are amid a pass over the pixels it is unbiased if what points give elsewhere does not
+/// depend on where they lie on the film, as with light subpaths; after whole passes it is so in any case.
+struct PointImage {
+    own: Vec<[f64; 4]>,
+    means: PixelMeans,
+    elsewhere: Option<(Vec<[f64; 4]>, f64)>,
+}
+
+impl PointImage {
+    /// The colour of a pixel.
+    fn of(&self, i: usize) -> [f64; 3] {
+        let own = self.means.of(&self.own[i]);
+        match &self.elsewhere {
+            Some((sums, scale)) => [0, 1, 2].map(|ch| own[ch] + sums[i][ch] * scale),
+            None => own,
+        }
     }
 }
 

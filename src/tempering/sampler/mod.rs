@@ -92,6 +92,8 @@ struct Screen {
     size: [u32; 2],
     film: Accumulator,
     unit: f64,
+    /// Whether there is room for what points contribute elsewhere than at their own positions.
+    elsewhere: bool,
     /// The layers that are recorded to.
     layers: Layers,
     /// All that there are.
@@ -155,6 +157,9 @@ pub struct Setup {
     pub size: [u32; 2],
     /// Typical magnitude of the brightest f.
     pub unit: f64,
+    /// Whether points may contribute elsewhere than at their own film positions, as [`Target::splats_elsewhere`] says;
+    /// that takes further layers of the film.
+    pub elsewhere: bool,
     /// Evaluations to go through; without end where absent.
     pub evaluations: Option<u64>,
 }
@@ -162,7 +167,7 @@ pub struct Setup {
 impl<W: Default + Send> Sampler<W> {
     /// Ready to start.
     pub fn new(setup: Setup) -> Sampler<W> {
-        let Setup { rng, choices, footprint, size, unit, evaluations } = setup;
+        let Setup { rng, choices, footprint, size, unit, elsewhere, evaluations } = setup;
         let most_rungs = match &choices.ladder {
             LadderChoice::Auto => MOST_AUTOMATIC,
             LadderChoice::Replicas(k) => *k as usize,
@@ -170,12 +175,13 @@ impl<W: Default + Send> Sampler<W> {
         };
         let mut plan = Plan::new(evaluations, 1);
         plan.blocks = plan.blocks.min((RUNGS_OF_ALL_BLOCKS / most_rungs).max(FEWEST_BLOCKS) & !1); // halves are compared
-        let layers = Layers::of(&choices, most_rungs);
+        let layers = Layers::of(&choices, most_rungs, elsewhere);
         let map = ProbeMap::new(size);
         let learns = choices.combine == Combine::Balance && most_rungs > 1;
         let screen = Screen {
             footprint,
             size,
+            elsewhere,
             film: Accumulator::new(size[0], size[1], layers.count, unit),
             unit,
             // before chains start there is nothing to balance: whole points, fireflies and all, would stay in the image
@@ -264,7 +270,11 @@ impl<W: Default + Send> Sampler<W> {
     /// the first end of a sweep with `until` evaluations done, or a change of what is [learnt](Sampler::learning), comes
     /// before. Returns how many they were. All state is a function of the job and the evaluations done, never of the threads or of how sweeps were
     /// sliced.
+    ///
+    /// # Panics
+    /// If the target contributes elsewhere than where its points lie and the set-up did not say so.
     pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, until: Option<u64>) -> u64 {
+        assert!(self.screen.elsewhere || !target.splats_elsewhere(), "no layers for what points contribute elsewhere");
         let learning = self.learning();
         let until = until.unwrap_or(u64::MAX);
         let mut gone = 0;

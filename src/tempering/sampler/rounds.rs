@@ -85,11 +85,16 @@ impl<W: Default + Send> Sampler<W> {
     /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
     fn weigh(&mut self) {
         let layer = self.screen.layers.even.expect("a layer of stratified points");
+        let mut sums = self.screen.film.layer(layer.own);
+        if let Some(elsewhere) = layer.elsewhere {
+            let more = self.screen.film.layer(elsewhere);
+            sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
+        }
         let luminance = |[r, g, b, points]: [f64; 4]| {
             let rgb = Rgb::new(r as f32, g as f32, b as f32);
             [f64::from(crate::path::luminance(rgb)), points]
         };
-        let found: Vec<[f64; 2]> = self.screen.film.layer(layer).into_iter().map(luminance).collect();
+        let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
         let importance = Arc::new(Importance::new(self.screen.size, &found));
         for portion in &mut self.portions {
             portion.uniform.set_importance(&importance);
@@ -439,5 +444,65 @@ impl<W: Default + Send> Sampler<W> {
             }
         }
         sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        film::{Filter, Footprint},
+        path::{Contribution, Contributions, FilmSplat},
+        rng::{Rng as Random, unit_f32},
+        sample::Proposals,
+        tempering::{Choices, Setup},
+    };
+
+    /// Points light the place where they lie evenly, and the right half of the film from anywhere.
+    struct LitFromElsewhere;
+
+    impl Target for LitFromElsewhere {
+        type Workspace = Vec<u32>;
+
+        fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, live: &mut Vec<u32>) {
+            proposals.begin(live);
+            proposals.draw(0, live);
+            for &lane in &*live {
+                let lane = lane as usize;
+                let [x, y, u, v] = proposals.block(0, lane).map(unit_f32);
+                out.elsewhere.clear(lane);
+                out.elsewhere.push(lane, FilmSplat { film: [0.5 + 0.5 * u, v], rgb: Rgb::splat(3.0) });
+                out.lanes[lane] = Contribution::settle_whole([x, y], Rgb::splat(1.0), &mut out.elsewhere, lane).0;
+            }
+        }
+
+        fn splats_elsewhere(&self) -> bool {
+            true
+        }
+    }
+
+    /// Luminance 1 on the left and 1 + 6 on the right, of mean 4: W = 1/(1/4 + 1/2) and 1/(7/4 + 1/2). The bootstrap's
+    /// 2¹² points give each of four tiles a mean to some 1.5 % (ten times that is let pass).
+    #[test]
+    fn importance_knows_of_light_from_elsewhere() {
+        let mut sampler = Sampler::new(Setup {
+            rng: Random::new(1),
+            choices: Choices { ladder: LadderChoice::Replicas(2), ..Choices::default() },
+            footprint: Footprint::new(Filter::Box, 2, 2),
+            size: [2, 2],
+            unit: 1.0,
+            elsewhere: true,
+            evaluations: Some(1 << 17),
+        });
+        while sampler.importance.is_none() {
+            sampler.advance(&LitFromElsewhere, 1, None);
+        }
+        let importance = sampler.importance.as_ref().unwrap();
+        for (x, expected) in [(0.25, 0.75), (0.75, 2.25)] {
+            for y in [0.25, 0.75] {
+                let inverse = (-importance.ln_at([x, y])).exp();
+                assert!((inverse / expected - 1.0).abs() < 0.15, "1/W at ({x}, {y}) is {inverse}, not {expected}");
+            }
+        }
     }
 }
