@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{
     Profile, Rgb, SceneDescription,
-    lights::{Light, LightSample},
+    lights::{Ball, Emission, EmitterKind, Light, LightSample},
 };
 use crate::math::Cumulative;
 
@@ -19,11 +19,13 @@ pub struct Emitters {
     choice: Option<Cumulative>,
     /// The light at infinity, if any; a scene has one at most.
     surrounding: Option<u32>,
+    /// All of the scene lies inside.
+    ball: Ball,
 }
 
 impl Emitters {
-    /// The lights of that scene, and for each shape the index of the light that it is.
-    pub(super) fn new(description: &SceneDescription, scene_radius: f32) -> (Emitters, Vec<Option<u32>>) {
+    /// The lights of that scene, which lies within the ball, and for each shape the index of the light that it is.
+    pub(super) fn new(description: &SceneDescription, bounds: Ball) -> (Emitters, Vec<Option<u32>>) {
         let mut lights: Vec<Light> = Vec::new();
         let of_shape = description
             .shapes
@@ -35,7 +37,7 @@ impl Emitters {
             .collect();
         lights.extend(description.lights.iter().cloned());
         let surrounding = lights.iter().position(Light::is_surrounding).map(|i| i as u32);
-        let power = |light: &Light| f64::from(crate::path::luminance(light.power(scene_radius)));
+        let power = |light: &Light| f64::from(crate::path::luminance(light.power(bounds.radius)));
         let total: f64 = lights.iter().map(power).sum();
         let uniform = 1.0 / lights.len().max(1) as f64;
         let share = |light: &Light| match total > 0.0 && total.is_finite() {
@@ -44,7 +46,7 @@ impl Emitters {
         };
         let probability: Vec<f32> = lights.iter().map(|light| share(light) as f32).collect();
         let choice = (!lights.is_empty()).then(|| Cumulative::new(probability.iter().map(|&p| f64::from(p))));
-        (Emitters { lights, probability, choice, surrounding }, of_shape)
+        (Emitters { lights, probability, choice, surrounding, ball: bounds.enlarged() }, of_shape)
     }
 
     /// The largest channel of any radiance or intensity; a scale for the brightness of paths.
@@ -80,7 +82,12 @@ impl Emitters {
         let light = self.choice.as_ref()?.index(choice);
         let probability = self.probability[light];
         let sample = self.lights[light].sample::<P>(p, ng, u)?;
-        Some(LightSample { weight: sample.weight / probability, pdf: sample.pdf * probability, ..sample })
+        Some(LightSample {
+            weight: sample.weight / probability,
+            pdf: sample.pdf * probability,
+            light: light as u32,
+            ..sample
+        })
     }
 
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal
@@ -89,10 +96,50 @@ impl Emitters {
     pub fn pdf<P: Profile>(&self, light: u32, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
         self.probability[light as usize] * self.lights[light as usize].pdf::<P>(origin, q, n)
     }
+
+    /// Starts a light subpath: `place` for the place on the light, `direction` for that in which light leaves (see
+    /// [`Emission`]), `choice` for the light; the densities include the choice. `None` where nothing leaves the chosen
+    /// light so.
+    #[inline(always)]
+    pub fn emit<P: Profile>(&self, place: [f32; 2], direction: [f32; 2], choice: f32) -> Option<Emission> {
+        if self.lights.len() == 1 {
+            return self.lights[0].emit::<P>(place, direction, self.ball);
+        }
+        let light = self.choice.as_ref()?.index(choice);
+        let probability = self.probability[light];
+        let emission = self.lights[light].emit::<P>(place, direction, self.ball)?;
+        Some(Emission {
+            weight: emission.weight / probability,
+            pdf_place: emission.pdf_place * probability,
+            light: light as u32,
+            ..emission
+        })
+    }
+
+    /// Densities [`Emission::pdf_place`], the choice of the light included, and [`Emission::pdf_rest`] with which
+    /// [`emit`](Self::emit) starts a subpath on that light at a place with those geometric and shading normals (of no
+    /// account for lights without surface) in the unit vector `direction`, in which light leaves.
+    #[inline(always)]
+    pub fn emission_pdf<P: Profile>(&self, light: u32, normals: [Vec3; 2], direction: Vec3) -> [f32; 2] {
+        let [place, rest] = self.lights[light as usize].emission_pdf::<P>(normals, direction, self.ball);
+        [self.probability[light as usize] * place, rest]
+    }
+
+    /// Where that light is, and with it what can find it.
+    #[inline]
+    pub fn kind(&self, light: u32) -> EmitterKind {
+        self.lights[light as usize].kind()
+    }
+
+    /// Index of the light that surrounds the scene, if any.
+    #[inline]
+    pub fn surrounding_light(&self) -> Option<u32> {
+        self.surrounding
+    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::Mat3;
 
     use super::*;
@@ -107,7 +154,7 @@ mod tests {
     };
 
     /// Lights that surfaces or directions can hit, one of each kind, around the origin's upper hemisphere.
-    fn lights() -> Vec<Light> {
+    pub fn lights() -> Vec<Light> {
         let corners = vec![Vec3::new(-1.0, -1.0, 2.0), Vec3::new(1.0, -1.0, 2.0), Vec3::new(0.0, 1.0, 3.0)];
         let white = Varying::Constant(Rgb::ONE);
         let sphere = |center: Vec3, radius: f32, flipped: bool| {
@@ -172,7 +219,10 @@ mod tests {
     fn the_choice_favours_power_but_forgets_nobody() {
         let lights = lights();
         let description = |lights: Vec<Light>| {
-            let (emitters, _) = Emitters::new(&crate::scene::description::tests::with_lights(lights), 1.0);
+            let (emitters, _) = Emitters::new(
+                &crate::scene::description::tests::with_lights(lights),
+                Ball { center: Vec3::ZERO, radius: 1.0 },
+            );
             emitters
         };
         let emitters = description(lights[..1].to_vec());

@@ -18,7 +18,7 @@ mod surface;
 pub mod textures;
 
 pub use appearance::Appearance;
-pub use camera::{Camera, Ray};
+pub use camera::{Camera, Ray, Sight};
 pub use description::SceneDescription;
 pub use emitters::Emitters;
 pub use features::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile};
@@ -28,6 +28,7 @@ pub use surface::{NO_LIGHT, Surface};
 use crate::embree;
 use description::{FilmDescription, Integrator, ShapeDescription, ShapeGeometry, Sides};
 use instances::Instances;
+use lights::Ball;
 use materials::Material;
 use surface::Shape;
 use textures::Varying;
@@ -77,8 +78,12 @@ impl Scene {
             to_world: instance.to_world,
         }));
         let tracer = embree::Scene::watched(device, geometries, watch)?;
-        let radius = tracer.bounds().map_or(1.0, |(low, high)| 0.5 * (high - low).length());
-        let (emitters, light_of_shape) = Emitters::new(&description, radius);
+        let around = |(low, high): (glam::Vec3, glam::Vec3)| Ball {
+            center: 0.5 * (low + high),
+            radius: 0.5 * (high - low).length(),
+        };
+        let bounds = tracer.bounds().map_or(Ball { center: glam::Vec3::ZERO, radius: 1.0 }, around);
+        let (emitters, light_of_shape) = Emitters::new(&description, bounds);
         let lights = light_of_shape.into_iter().chain(std::iter::repeat(None)); // shapes of groups do not emit
         let surface = |(shape, light)| surface_of(shape, light, &description.appearances);
         let shapes = description.all_shapes().zip(lights).map(surface).collect();

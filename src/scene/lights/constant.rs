@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{Emit, LightSample, origin_towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_infinity, origin_towards};
 use crate::{
     math::warp,
     scene::{Rgb, parameters::Parameters},
@@ -27,6 +27,10 @@ impl Constant {
 }
 
 impl Emit for Constant {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surrounding
+    }
+
     /// What enters the sphere around the scene: L · π · 4πr².
     fn power(&self, scene_radius: f32) -> Rgb {
         self.radiance * (4.0 * PI * PI * scene_radius * scene_radius)
@@ -40,11 +44,21 @@ impl Emit for Constant {
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let wi = warp::sphere(u);
         let origin = origin_towards(p, ng, wi);
-        Some(LightSample { origin, wi, tfar: f32::MAX, weight: self.radiance / PDF, pdf: PDF })
+        Some(LightSample::from_infinity(origin, wi, self.radiance / PDF, PDF))
     }
 
     #[inline(always)]
     fn pdf(&self, _origin: Vec3, _q: Vec3, _n: Vec3) -> f32 {
         PDF
+    }
+
+    #[inline(always)]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
+        Some(from_infinity(scene, -warp::sphere(place), self.radiance, PDF, self.kind(), direction))
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, _normals: [Vec3; 2], _direction: Vec3, scene: Ball) -> [f32; 2] {
+        [PDF, scene.pdf()]
     }
 }

@@ -4,7 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec3};
 
-use super::{Emit, LightSample, per_solid_angle, towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
 use crate::{
     math::sin_cos_turn,
     scene::{Rgb, parametrisation::cylinder_uv, textures::Varying},
@@ -31,9 +31,24 @@ impl Cylinder {
     fn area(&self) -> f32 {
         TAU * self.radius * self.length
     }
+
+    /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance.
+    #[inline(always)]
+    fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
+        let (sin, cos) = sin_cos_turn(u[0]);
+        let outside = self.axes.x_axis * cos + self.axes.y_axis * sin;
+        let from_start = self.axes.z_axis * (u[1] * self.length) + outside * self.radius;
+        let front = if self.flipped { -outside } else { outside };
+        let radiance = self.radiance.at(|| cylinder_uv(&self.axes, self.length, from_start));
+        (self.start + from_start, [front; 2], radiance)
+    }
 }
 
 impl Emit for Cylinder {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surface
+    }
+
     fn power(&self, _scene_radius: f32) -> Rgb {
         self.radiance.mean() * (PI * self.area())
     }
@@ -45,16 +60,23 @@ impl Emit for Cylinder {
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (sin, cos) = sin_cos_turn(u[0]);
-        let outside = self.axes.x_axis * cos + self.axes.y_axis * sin;
-        let from_start = self.axes.z_axis * (u[1] * self.length) + outside * self.radius;
-        let front = if self.flipped { -outside } else { outside };
-        let radiance = self.radiance.at(|| cylinder_uv(&self.axes, self.length, from_start));
-        towards(p, ng, self.start + from_start, [front; 2], radiance, 1.0 / self.area())
+        let (q, normals, radiance) = self.place(u);
+        towards(p, ng, q, normals, radiance, 1.0 / self.area())
     }
 
     #[inline(always)]
     fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
         per_solid_angle(1.0 / self.area(), origin, q, n)
+    }
+
+    #[inline(always)]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
+        let (q, normals, radiance) = self.place(place);
+        from_surface(q, normals, radiance, 1.0 / self.area(), direction)
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
+        surface_pdf(1.0 / self.area(), normals, direction)
     }
 }

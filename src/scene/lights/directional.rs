@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{Emit, LightSample, origin_towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_infinity, origin_towards};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Parallel light from infinitely far away. Parameters: `direction` in which it travels, or the z axis of `to_world`;
@@ -33,6 +33,10 @@ impl Directional {
 }
 
 impl Emit for Directional {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::SingleDirection
+    }
+
     /// What enters the sphere around the scene: E π r².
     fn power(&self, scene_radius: f32) -> Rgb {
         self.irradiance * (PI * scene_radius * scene_radius)
@@ -46,11 +50,21 @@ impl Emit for Directional {
     fn sample(&self, p: Vec3, ng: Vec3, _u: [f32; 2]) -> Option<LightSample> {
         let wi = -self.direction;
         let origin = origin_towards(p, ng, wi);
-        Some(LightSample { origin, wi, tfar: f32::MAX, weight: self.irradiance, pdf: f32::INFINITY })
+        Some(LightSample::from_infinity(origin, wi, self.irradiance, f32::INFINITY))
     }
 
     #[inline(always)]
     fn pdf(&self, _origin: Vec3, _q: Vec3, _n: Vec3) -> f32 {
         0.0
+    }
+
+    #[inline(always)]
+    fn emit(&self, _place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
+        Some(from_infinity(scene, self.direction, self.irradiance, 1.0, self.kind(), direction))
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, _normals: [Vec3; 2], _direction: Vec3, scene: Ball) -> [f32; 2] {
+        [1.0, scene.pdf()]
     }
 }

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Mat3, Vec3};
 
-use super::{Emit, LightSample, per_solid_angle, towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
 use crate::{
     math::{Frame, warp},
     scene::{Rgb, parametrisation::disk_uv, textures::Varying},
@@ -29,9 +29,22 @@ impl Disk {
     fn pdf_area(&self) -> f32 {
         warp::INV_PI / (self.radius * self.radius)
     }
+
+    /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance.
+    #[inline(always)]
+    fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
+        let d = warp::disk(u) * self.radius;
+        let from_centre = self.frame.s * d.x + self.frame.t * d.y;
+        let radiance = self.radiance.at(|| disk_uv(&self.axes, self.radius, from_centre));
+        (self.center + from_centre, [self.frame.n; 2], radiance)
+    }
 }
 
 impl Emit for Disk {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surface
+    }
+
     fn power(&self, _scene_radius: f32) -> Rgb {
         self.radiance.mean() * (PI * PI * self.radius * self.radius)
     }
@@ -43,14 +56,23 @@ impl Emit for Disk {
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let d = warp::disk(u) * self.radius;
-        let from_centre = self.frame.s * d.x + self.frame.t * d.y;
-        let radiance = self.radiance.at(|| disk_uv(&self.axes, self.radius, from_centre));
-        towards(p, ng, self.center + from_centre, [self.frame.n; 2], radiance, self.pdf_area())
+        let (q, normals, radiance) = self.place(u);
+        towards(p, ng, q, normals, radiance, self.pdf_area())
     }
 
     #[inline(always)]
     fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
         per_solid_angle(self.pdf_area(), origin, q, n)
+    }
+
+    #[inline(always)]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
+        let (q, normals, radiance) = self.place(place);
+        from_surface(q, normals, radiance, self.pdf_area(), direction)
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
+        surface_pdf(self.pdf_area(), normals, direction)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec3};
 
-use super::{Emit, LightSample, origin_towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_infinity, origin_towards};
 use crate::math::{Cumulative, sin_cos_turn};
 use crate::path::luminance;
 use crate::scene::{
@@ -141,6 +141,20 @@ impl Map {
         a.lerp(b, t[0]).lerp(c.lerp(d, t[0]), t[1])
     }
 
+    /// Draws a direction; with it the radiance from there and the density, with respect to solid angle.
+    #[inline]
+    fn draw(&self, u: [f32; 2]) -> (Vec3, Rgb, f32) {
+        let (row, down) = self.of_rows.choose(u[1]);
+        let (column, across) = self.of_cells[row].choose(u[0]);
+        let (high, low) = (self.cosines[row], self.cosines[row + 1]);
+        let cos = high + (low - high) * down;
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let (s, c) = sin_cos_turn((column as f32 + 0.5 + across) / self.columns as f32);
+        let wi = (self.axes * Vec3::new(sin * s, cos, -sin * c)).normalize();
+        let theta = libm::acosf(cos.clamp(-1.0, 1.0)) / PI * self.rows as f32 - row as f32;
+        (wi, self.within(row, column, [across, theta.clamp(0.0, 1.0)]), self.density(row, column))
+    }
+
     /// Density of sampling any direction in a cell, with respect to solid angle.
     #[inline]
     fn density(&self, row: usize, column: usize) -> f32 {
@@ -158,6 +172,10 @@ fn corners(texels: &[Rgb], columns: usize, row: usize, column: usize) -> [Rgb; 4
 }
 
 impl Emit for Envmap {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surrounding
+    }
+
     /// What enters the sphere around the scene: the mean radiance · π · 4πr².
     fn power(&self, scene_radius: f32) -> Rgb {
         self.0.mean * (4.0 * PI * PI * scene_radius * scene_radius)
@@ -169,19 +187,9 @@ impl Emit for Envmap {
 
     #[inline]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let map = &*self.0;
-        let (row, down) = map.of_rows.choose(u[1]);
-        let (column, across) = map.of_cells[row].choose(u[0]);
-        let (high, low) = (map.cosines[row], map.cosines[row + 1]);
-        let cos = high + (low - high) * down;
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let (s, c) = sin_cos_turn((column as f32 + 0.5 + across) / map.columns as f32);
-        let wi = (map.axes * Vec3::new(sin * s, cos, -sin * c)).normalize();
-        let theta = libm::acosf(cos.clamp(-1.0, 1.0)) / PI * map.rows as f32 - row as f32;
-        let radiance = map.within(row, column, [across, theta.clamp(0.0, 1.0)]);
-        let pdf = map.density(row, column);
+        let (wi, radiance, pdf) = self.0.draw(u);
         let origin = origin_towards(p, ng, wi);
-        (pdf > 0.0).then(|| LightSample { origin, wi, tfar: f32::MAX, weight: radiance / pdf, pdf })
+        (pdf > 0.0).then(|| LightSample::from_infinity(origin, wi, radiance / pdf, pdf))
     }
 
     #[inline]
@@ -189,15 +197,27 @@ impl Emit for Envmap {
         let ([column, row], _) = self.0.cell(q);
         self.0.density(row, column)
     }
+
+    #[inline]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
+        let (wi, radiance, pdf) = self.0.draw(place);
+        (pdf > 0.0).then(|| from_infinity(scene, -wi, radiance, pdf, self.kind(), direction))
+    }
+
+    #[inline]
+    fn emission_pdf(&self, _normals: [Vec3; 2], direction: Vec3, scene: Ball) -> [f32; 2] {
+        let ([column, row], _) = self.0.cell(-direction);
+        [self.0.density(row, column), scene.pdf()]
+    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::rng::{Counter, Purpose, Rng, unit_f32};
 
     /// Dark but for one bright texel at column 2 of 8 and row 1 of 5, on a turned sky.
-    fn sky() -> Envmap {
+    pub fn sky() -> Envmap {
         let mut texels = vec![Rgb::splat(0.1); 40];
         texels[10] = Rgb::new(50.0, 20.0, 5.0);
         Envmap(Arc::new(Map::new(texels, 8, Mat3::from_rotation_x(0.7))))

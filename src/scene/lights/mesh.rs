@@ -4,7 +4,7 @@ use std::{f32::consts::PI, sync::Arc};
 
 use glam::Vec3;
 
-use super::{Emit, LightSample, per_solid_angle, towards};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
 use crate::{
     math::{Cumulative, warp},
     scene::{Mesh, Rgb, textures::Varying},
@@ -34,10 +34,10 @@ impl MeshLight {
         MeshLight { mesh, triangles: Cumulative::new(areas.into_iter()), inverse_area: (1.0 / total) as f32, radiance }
     }
 
-    /// A point with the geometric and the shading normal there and the radiance. The first number also chooses the triangle, so that
-    /// near numbers give near points of one triangle.
+    /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance. The
+    /// first number also chooses the triangle, so that near numbers give near points of one triangle.
     #[inline(always)]
-    fn point(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
+    fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
         let (triangle, within) = self.triangles.choose(u[0]);
         let [b, c] = warp::triangle([within, u[1]]);
         let [p0, p1, p2] = self.mesh.corners(triangle as u32);
@@ -49,6 +49,10 @@ impl MeshLight {
 }
 
 impl Emit for MeshLight {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surface
+    }
+
     fn power(&self, _scene_radius: f32) -> Rgb {
         self.radiance.mean() * (PI / self.inverse_area)
     }
@@ -60,12 +64,23 @@ impl Emit for MeshLight {
 
     #[inline(always)]
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (q, normals, radiance) = self.point(u);
+        let (q, normals, radiance) = self.place(u);
         towards(p, ng, q, normals, radiance, self.inverse_area)
     }
 
     #[inline(always)]
     fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32 {
         per_solid_angle(self.inverse_area, origin, q, n)
+    }
+
+    #[inline(always)]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
+        let (q, normals, radiance) = self.place(place);
+        from_surface(q, normals, radiance, self.inverse_area, direction)
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
+        surface_pdf(self.inverse_area, normals, direction)
     }
 }

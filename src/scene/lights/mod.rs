@@ -1,6 +1,7 @@
 //! Kinds of lights, one file each.
 //!
-//! A light knows how to be sampled from a surface point and with what density; choosing among the lights of a scene is
+//! A light knows how to be sampled from a surface point, how to start light subpaths ([`Emission`]), and with what
+//! density; choosing among the lights of a scene is
 //! [`Emitters`](super::Emitters)' business. Surfaces that emit become one of the kinds by [`Light::of_shape`], others
 //! are read from files by [`read`].
 //!
@@ -10,6 +11,7 @@ mod constant;
 mod cylinder;
 mod directional;
 mod disk;
+mod emission;
 mod envmap;
 mod mesh;
 mod point;
@@ -20,6 +22,7 @@ pub use constant::Constant;
 pub use cylinder::Cylinder;
 pub use directional::Directional;
 pub use disk::Disk;
+pub use emission::{Ball, Emission, EmitterKind};
 pub use envmap::Envmap;
 pub use mesh::MeshLight;
 pub use point::Point;
@@ -35,6 +38,7 @@ use super::{
     textures::Varying,
 };
 use crate::math::offset_origin;
+use emission::{from_infinity, from_point, from_surface, surface_pdf};
 
 /// A direction towards a light.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +53,18 @@ pub struct LightSample {
     pub weight: Rgb,
     /// Density with respect to solid angle; infinite for points and single directions, which no other technique can hit.
     pub pdf: f32,
+    /// Geometric and shading unit normal at the sampled place of a surface; zero for lights without surface.
+    pub normals: [Vec3; 2],
+    /// Index of the light, as [`Emitters`](super::Emitters) count them; 0 from a light itself.
+    pub light: u32,
+}
+
+impl LightSample {
+    /// A direction to a light at infinity.
+    #[inline(always)]
+    fn from_infinity(origin: Vec3, wi: Vec3, weight: Rgb, pdf: f32) -> LightSample {
+        LightSample { origin, wi, tfar: f32::MAX, weight, pdf, normals: [Vec3::ZERO; 2], light: 0 }
+    }
 }
 
 /// Keeps shadow rays from meeting the light itself.
@@ -56,6 +72,8 @@ const SHORT_OF_LIGHT: f32 = 0.9999;
 
 /// A kind of light.
 trait Emit {
+    /// Where it is.
+    fn kind(&self) -> EmitterKind;
     /// Emitted power in W, up to the unit of the scene, per channel; `scene_radius` is that of a sphere around it.
     fn power(&self, scene_radius: f32) -> Rgb;
     /// Radiance over its surface, of what rays can hit.
@@ -73,6 +91,13 @@ trait Emit {
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal `n`
     /// on it, with respect to solid angle at `origin`; for lights at infinity, in the direction `q` from anywhere.
     fn pdf(&self, origin: Vec3, q: Vec3, n: Vec3) -> f32;
+    /// Starts a light subpath in the scene within that ball: `place` for the place, which of lights all around is a
+    /// direction, and `direction` for the rest; `None` where nothing leaves the light so.
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission>;
+    /// [`Emission::pdf_place`] and [`Emission::pdf_rest`] with which [`emit`](Self::emit) starts a subpath at a place with
+    /// those geometric and shading normals in the unit vector `direction`, in which light leaves. Of single directions
+    /// that is the light's own; of points the place is the light's.
+    fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, scene: Ball) -> [f32; 2];
 }
 
 macro_rules! registry {
@@ -126,6 +151,39 @@ macro_rules! registry {
                     $(Light::$kind(light) => light.pdf(origin, q, n)),+
                 }
             }
+
+            /// Starts a light subpath in the scene within that ball: `place` for the place, which of lights all around
+            /// is a direction, and `direction` for the rest; `None` where nothing leaves the light so.
+            #[inline(always)]
+            pub fn emit<P: Profile>(&self, place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
+                match self {
+                    Light::MeshLight(light) => light.emit(place, direction, scene),
+                    _ if P::FLAT_MESHES => unreachable!("a profile with lights on flat meshes only"),
+                    $(Light::$kind(light) => light.emit(place, direction, scene)),+
+                }
+            }
+
+            /// [`Emission::pdf_place`] and [`Emission::pdf_rest`] with which [`emit`](Self::emit) starts a subpath at
+            /// a place with those geometric and shading normals (of no account for lights without surface) in the unit
+            /// vector `direction`, in which light leaves. Of points and single directions, of which there is but one,
+            /// the place is taken to be the light's, or the direction.
+            #[inline(always)]
+            pub fn emission_pdf<P: Profile>(&self, normals: [Vec3; 2], direction: Vec3, scene: Ball) -> [f32; 2] {
+                match self {
+                    Light::MeshLight(light) => light.emission_pdf(normals, direction, scene),
+                    _ if P::FLAT_MESHES => unreachable!("a profile with lights on flat meshes only"),
+                    $(Light::$kind(light) => light.emission_pdf(normals, direction, scene)),+
+                }
+            }
+
+            /// Where it is, and with it what can find it.
+            #[inline]
+            pub fn kind(&self) -> EmitterKind {
+                match self {
+                    Light::MeshLight(light) => light.kind(),
+                    $(Light::$kind(light) => light.kind()),+
+                }
+            }
         }
     };
 }
@@ -163,7 +221,7 @@ impl Light {
 
     /// Whether it is infinitely far away in all directions, so that what leaves the scene meets it.
     pub fn is_surrounding(&self) -> bool {
-        matches!(self, Light::Constant(_) | Light::Envmap(_))
+        self.kind() == EmitterKind::Surrounding
     }
 
     /// Radiance that comes from the direction `d`, and the density of sampling that direction, of a light that
@@ -214,7 +272,15 @@ fn towards(
         return None; // from behind
     }
     let pdf = pdf_area * d2 / cos;
-    Some(LightSample { origin, wi, tfar: distance * SHORT_OF_LIGHT, weight: radiance / pdf, pdf })
+    Some(LightSample {
+        origin,
+        wi,
+        tfar: distance * SHORT_OF_LIGHT,
+        weight: radiance / pdf,
+        pdf,
+        normals: [geometric, shading],
+        light: 0,
+    })
 }
 
 /// A density per area as one per solid angle at `origin`: times distance² over the cosine at the light.

@@ -4,8 +4,11 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{Emit, LightSample, SHORT_OF_LIGHT, origin_towards};
-use crate::scene::{Rgb, parameters::Parameters};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_point, origin_towards};
+use crate::{
+    math::warp,
+    scene::{Rgb, parameters::Parameters},
+};
 
 /// A point that shines equally in all directions. Parameters: `position` (default: the origin of `to_world`),
 /// `intensity`, W/sr, default 1.
@@ -17,6 +20,9 @@ pub struct Point {
     pub intensity: Rgb,
 }
 
+/// Uniform over all directions.
+const PDF: f32 = 0.25 * warp::INV_PI;
+
 impl Point {
     pub(super) fn read(p: &mut dyn Parameters) -> Point {
         let position = p.point("position");
@@ -26,6 +32,10 @@ impl Point {
 }
 
 impl Emit for Point {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Point
+    }
+
     fn power(&self, _scene_radius: f32) -> Rgb {
         self.intensity * (4.0 * PI)
     }
@@ -46,11 +56,23 @@ impl Emit for Point {
             tfar: distance * SHORT_OF_LIGHT,
             weight: self.intensity / d2,
             pdf: f32::INFINITY,
+            normals: [Vec3::ZERO; 2],
+            light: 0,
         })
     }
 
     #[inline(always)]
     fn pdf(&self, _origin: Vec3, _q: Vec3, _n: Vec3) -> f32 {
         0.0
+    }
+
+    #[inline(always)]
+    fn emit(&self, _place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
+        Some(from_point(self.position, warp::sphere(direction), self.intensity, PDF))
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, _normals: [Vec3; 2], _direction: Vec3, _scene: Ball) -> [f32; 2] {
+        [1.0, PDF]
     }
 }

@@ -4,14 +4,17 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec3};
 
-use super::{Emit, LightSample, SHORT_OF_LIGHT, origin_towards, per_solid_angle, towards};
+use super::{
+    Ball, Emission, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_surface, origin_towards, per_solid_angle,
+    surface_pdf, towards,
+};
 use crate::{
     math::{Frame, warp},
     scene::{Rgb, parametrisation::sphere_uv, textures::Varying},
 };
 
 /// A sphere that emits from its outside (from its inside, if flipped): uniform over the solid angle under which it is
-/// seen from outside, uniform over its area from inside. Source: Shirley, Wang & Zimmerman 1996, section 3.2.
+/// seen from outside, uniform over its area from inside and where light paths start. Source: Shirley, Wang & Zimmerman 1996, section 3.2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre.
@@ -31,6 +34,14 @@ impl Sphere {
         0.25 * warp::INV_PI / (self.radius * self.radius)
     }
 
+    /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance.
+    #[inline(always)]
+    fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
+        let n = warp::sphere(u);
+        let front = if self.flipped { -n } else { n };
+        (self.center + n * self.radius, [front; 2], self.radiance.at(|| sphere_uv(&self.axes, n)))
+    }
+
     /// 1 − cos of the half angle under which it is seen from outside; `None` from inside. With sin² small the
     /// difference is taken as sin²/(1 + cos), which keeps its digits.
     #[inline(always)]
@@ -41,6 +52,10 @@ impl Sphere {
 }
 
 impl Emit for Sphere {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Surface
+    }
+
     fn power(&self, _scene_radius: f32) -> Rgb {
         self.radiance.mean() * (4.0 * PI * PI * self.radius * self.radius)
     }
@@ -54,10 +69,8 @@ impl Emit for Sphere {
     fn sample(&self, p: Vec3, ng: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let towards_center = origin_towards(p, ng, self.center - p);
         let Some(one_minus_cos) = self.one_minus_cos(towards_center) else {
-            let n = warp::sphere(u);
-            let front = if self.flipped { -n } else { n };
-            let radiance = self.radiance.at(|| sphere_uv(&self.axes, n));
-            return towards(p, ng, self.center + n * self.radius, [front; 2], radiance, self.pdf_area());
+            let (q, normals, radiance) = self.place(u);
+            return towards(p, ng, q, normals, radiance, self.pdf_area());
         };
         if self.flipped {
             return None; // the outside does not shine
@@ -72,7 +85,15 @@ impl Emit for Sphere {
         let distance = along - half_chord;
         let outside = || (wi * distance - to).normalize_or(-wi);
         let radiance = self.radiance.at(|| sphere_uv(&self.axes, outside()));
-        Some(LightSample { origin, wi, tfar: distance * SHORT_OF_LIGHT, weight: radiance / pdf, pdf })
+        Some(LightSample {
+            origin,
+            wi,
+            tfar: distance * SHORT_OF_LIGHT,
+            weight: radiance / pdf,
+            pdf,
+            normals: [outside(); 2],
+            light: 0,
+        })
     }
 
     #[inline(always)]
@@ -81,5 +102,16 @@ impl Emit for Sphere {
             Some(one_minus_cos) => 1.0 / (TAU * one_minus_cos),
             None => per_solid_angle(self.pdf_area(), origin, q, n),
         }
+    }
+
+    #[inline(always)]
+    fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
+        let (q, normals, radiance) = self.place(place);
+        from_surface(q, normals, radiance, self.pdf_area(), direction)
+    }
+
+    #[inline(always)]
+    fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
+        surface_pdf(self.pdf_area(), normals, direction)
     }
 }

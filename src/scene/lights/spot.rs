@@ -1,9 +1,14 @@
 //! A spot light.
 
+use std::f32::consts::TAU;
+
 use glam::Vec3;
 
-use super::{Emit, LightSample, Point};
-use crate::scene::{Rgb, parameters::Parameters};
+use super::{Ball, Emission, Emit, EmitterKind, LightSample, Point, from_point};
+use crate::{
+    math::{Frame, warp},
+    scene::{Rgb, parameters::Parameters},
+};
 
 /// A point that shines into a cone: full intensity within half of `beam_width`, falling linearly with the angle to
 /// nothing at half of `cutoff_angle`, both angles from the axis.
@@ -16,6 +21,8 @@ pub struct Spot {
     axis: Vec3,
     cos_beam: f32,
     cos_cutoff: f32,
+    /// 1 − cos of the cutoff, as 2 sin² of its half, which keeps the digits of narrow cones.
+    one_minus_cos: f32,
     /// Radians.
     cutoff: f32,
     /// 1/(cutoff − beam width), per radian.
@@ -47,7 +54,16 @@ impl Spot {
     pub fn new(point: Point, axis: Vec3, beam: f32, cutoff: f32) -> Spot {
         let (beam, cutoff) = (beam.to_radians(), cutoff.to_radians());
         let cos = |angle: f32| libm::cosf(angle);
-        Spot { point, axis, cos_beam: cos(beam), cos_cutoff: cos(cutoff), cutoff, steepness: 1.0 / (cutoff - beam) }
+        let sin_half = libm::sinf(0.5 * cutoff);
+        Spot {
+            point,
+            axis,
+            cos_beam: cos(beam),
+            cos_cutoff: cos(cutoff),
+            one_minus_cos: 2.0 * sin_half * sin_half,
+            cutoff,
+            steepness: 1.0 / (cutoff - beam),
+        }
     }
 
     /// Intensity in a direction at that cosine from the axis, by that on it.
@@ -61,9 +77,13 @@ impl Spot {
 }
 
 impl Emit for Spot {
+    fn kind(&self) -> EmitterKind {
+        EmitterKind::Point
+    }
+
     /// As if the intensity fell at once, in the middle between the two cones: it only guides the choice among lights.
     fn power(&self, _scene_radius: f32) -> Rgb {
-        self.point.intensity * (std::f32::consts::TAU * (1.0 - 0.5 * (self.cos_beam + self.cos_cutoff)))
+        self.point.intensity * (TAU * (1.0 - 0.5 * (self.cos_beam + self.cos_cutoff)))
     }
 
     fn largest(&self) -> f32 {
@@ -80,6 +100,20 @@ impl Emit for Spot {
     #[inline(always)]
     fn pdf(&self, _origin: Vec3, _q: Vec3, _n: Vec3) -> f32 {
         0.0
+    }
+
+    #[inline(always)]
+    fn emit(&self, _place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
+        let direction = Frame::new(self.axis).to_world(warp::cone(direction, self.one_minus_cos));
+        let falloff = self.falloff(direction.dot(self.axis));
+        let [_, pdf] = self.emission_pdf([Vec3::ZERO; 2], direction, scene);
+        (falloff > 0.0).then(|| from_point(self.point.position, direction, self.point.intensity * falloff, pdf))
+    }
+
+    /// Directions are uniform over the cone of the cutoff.
+    #[inline(always)]
+    fn emission_pdf(&self, _normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
+        [1.0, if direction.dot(self.axis) > self.cos_cutoff { 1.0 / (TAU * self.one_minus_cos) } else { 0.0 }]
     }
 }
 
