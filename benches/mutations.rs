@@ -190,7 +190,7 @@ fn bare_embree(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     group.bench_function("embree", |bencher| {
         let (tracer, widths) = (&subject.scene().tracer, subject.widths());
         let rays = recorded.get_or_init(|| {
-            let rays = record_rays(subject.scene(), BATCHES);
+            let rays = record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES);
             let total: usize = [&rays.camera, &rays.bounce, &rays.shadow].into_iter().flatten().map(Rays::len).sum();
             println!("{:.2} rays a path", total as f64 / (BATCHES * LANES) as f64);
             rays

@@ -136,7 +136,7 @@ fn trace(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let (mut hits, mut occluded) = (Hits::default(), Vec::new());
     group.bench_function("trace", |bencher| {
         let (tracer, widths) = (&subject.scene().tracer, subject.widths());
-        let rays = recorded.get_or_init(|| record_rays(subject.scene(), BATCHES));
+        let rays = recorded.get_or_init(|| record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES));
         bencher.iter(|| {
             rays.camera.iter().for_each(|rays| tracer.closest(widths.camera, rays, &mut hits));
             rays.bounce.iter().for_each(|rays| tracer.closest(widths.bounce, rays, &mut hits));
@@ -150,8 +150,9 @@ fn shade(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let mut replayed = None;
     group.bench_function("shade", |bencher| {
         let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
-        let paths =
-            replayed.get_or_insert_with(|| evaluator(Workspace::replaying(record_rays(subject.scene(), BATCHES))));
+        let paths = replayed.get_or_insert_with(|| {
+            evaluator(Workspace::replaying(record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES)))
+        });
         bencher.iter(|| {
             for step in 0..BATCHES {
                 set_step(paths, step);

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use relt::embree::Device;
-use relt::path::Widths;
+use relt::path::{MappingKind, Widths};
 use relt::render::calibration::calibrate;
 use relt::scene::{Scene, SceneDescription};
 
@@ -33,7 +33,7 @@ impl Subject {
     /// The packet widths that calibration finds fastest.
     pub fn widths(&self) -> Widths {
         *self.widths.get_or_init(|| {
-            let widths = calibrate(self.scene());
+            let widths = calibrate(self.scene(), MappingKind::Unidirectional);
             println!("{}: {widths:?}", self.name);
             widths
         })

@@ -28,6 +28,10 @@ pub trait Target: Sync {
 impl Target for Mapping<'_> {
     type Workspace = Workspace;
 
+    fn splats_elsewhere(&self) -> bool {
+        self.kind().splats_elsewhere()
+    }
+
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
         Mapping::evaluate(self, proposals, out, workspace);
     }

@@ -355,6 +355,7 @@ mod tests {
                      --mpp 10 --time 5m --seed 7 --threads 1 --pin";
         let given: Vec<_> = given.split(' ').collect();
         let expected = Settings {
+            mapping: MappingChoice::Auto,
             method: Method::ReplicaExchange,
             seed: 7,
             threads: Some(1),

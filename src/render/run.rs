@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     film::Footprint,
-    path::{Mapping, MappingKind, Widths},
+    path::{Mapping, Widths},
     rng::Rng,
     scene::Scene,
     tempering::RoundReport,
@@ -269,6 +269,7 @@ mod tests {
     use crate::{
         embree::{Device, Width},
         film::Image,
+        path::MappingKind,
         render::engine::{Counts, Development},
     };
 

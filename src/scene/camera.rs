@@ -220,7 +220,7 @@ struct Seen {
     /// How far the ray that reaches it has come from the near plane, and how far it goes.
     from_near: f32,
     reach: f32,
-    /// The density of rays over [`Camera::density`](field@Camera::density).
+    /// The density of rays over what is common to all of the camera.
     spread: f32,
 }
 
@@ -407,5 +407,117 @@ mod tests {
         }
         assert!(((left.origin - right.origin).length() - 6.0).abs() < 1e-5);
         assert!(((top.origin - bottom.origin).length() - 3.0).abs() < 1e-5);
+    }
+
+    /// Cameras of every kind, with what can be given to them: a principal point, a part of the picture, a transform that
+    /// scales, shears, mirrors.
+    fn cameras() -> Vec<Camera> {
+        let moved = Affine3A::from_scale_rotation_translation(
+            Vec3::new(1.5, 0.7, 2.0),
+            glam::Quat::from_rotation_x(0.5) * glam::Quat::from_rotation_y(-1.1),
+            Vec3::new(1.0, -2.0, 3.0),
+        );
+        let sheared = Affine3A::from_cols_array_2d(&[
+            [-1.2, 0.1, 0.0], // a mirror, as files have it
+            [0.3, 0.9, 0.2],
+            [0.2, -0.4, 1.1],
+            [0.5, 0.0, -1.0],
+        ]);
+        let part = FilmDescription { window: Window { whole: [40, 30], offset: [9, 5] }, ..film(24, 16) };
+        let lens = Some(Lens { aperture_radius: 0.25, focus_distance: 4.0 });
+        let eye = |principal_point, lens| Projection::Perspective {
+            fov: 70.0,
+            fov_axis: FovAxis::Smaller,
+            principal_point,
+            lens,
+        };
+        let mut cameras = Vec::new();
+        for to_world in [Affine3A::IDENTITY, moved, sheared] {
+            for film in [film(30, 20), part] {
+                for projection in
+                    [eye([0.0; 2], None), eye([0.2, -0.1], None), eye([-0.1, 0.15], lens), Projection::Orthographic]
+                {
+                    cameras.push(seen_from(to_world, projection, film.clone()));
+                }
+            }
+        }
+        cameras
+    }
+
+    /// Uniform numbers, eight at a time.
+    fn numbers(count: u64) -> impl Iterator<Item = [f32; 8]> {
+        use crate::rng::{Counter, Purpose, Rng, unit_f32};
+        let rng = Rng::new(5);
+        (0..count).map(move |step| {
+            let words = |block| {
+                rng.words(Counter { ladder: 0, replica: 0, step, purpose: Purpose::Primary }, block).map(unit_f32)
+            };
+            let ([a, b, c, d], [e, f, g, h]) = (words(0), words(1));
+            [a, b, c, d, e, f, g, h]
+        })
+    }
+
+    #[test]
+    fn a_point_is_seen_where_the_ray_to_it_comes_from() {
+        for camera in cameras() {
+            for [x, y, a, b, t, ..] in numbers(1000) {
+                let ray = camera.ray([x, y], [a, b]);
+                let distance = ray.tfar * (0.001 + 0.998 * t);
+                let p = ray.origin + ray.direction * distance;
+                let Some(sight) = camera.sight(p, [a, b]) else {
+                    // but for rounding at the border
+                    assert!([x, y].iter().any(|f| (f - 0.5).abs() > 0.4999), "{p} at ({x}, {y}) unseen by {camera:?}");
+                    continue;
+                };
+                let off = (sight.film[0] - x).abs().max((sight.film[1] - y).abs());
+                assert!(off < 2e-4, "({x}, {y}) seen at {:?} by {camera:?}", sight.film);
+                assert_near(sight.direction, -ray.direction, "direction to the eye");
+                let error = (sight.distance - distance).abs();
+                assert!(error < 2e-5 * (1.0 + distance), "{} for {distance} by {camera:?}", sight.distance);
+                assert_eq!(sight.density, camera.density(p, [a, b]));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_view_is_not_seen() {
+        for camera in cameras() {
+            for [x, y, a, b, t, ..] in numbers(100) {
+                let ray = camera.ray([x, y], [a, b]);
+                let at = |distance: f32| camera.sight(ray.origin + ray.direction * distance, [a, b]);
+                assert!(at(-0.01).is_none(), "before the near plane of {camera:?}");
+                assert!(at(1.01 * ray.tfar).is_none(), "beyond the far plane of {camera:?}");
+                let behind = at(-3.0 - 5.0 * t);
+                assert!(behind.is_none(), "behind {camera:?}: {behind:?}");
+                for film in [[x - 1.001, y], [x + 1.001, y], [x, y - 1.001], [x, y + 1.001]] {
+                    let ray = camera.ray(film, [a, b]);
+                    let sight = camera.sight(ray.origin + ray.direction * (0.5 * ray.tfar), [a, b]);
+                    assert!(sight.is_none(), "{film:?} seen at {sight:?} by {camera:?}");
+                }
+            }
+        }
+    }
+
+    /// One over the area of the cross-section that rays to a unit of the film have, by central differences, whose error
+    /// goes with the square of the step; bound 0.3 %.
+    #[test]
+    fn the_density_is_that_of_the_rays() {
+        /// Half the step; the error of second order is some 10⁻⁴ of the area, that of rounding 10⁻⁴ of a side.
+        const STEP: f32 = 0.01;
+        for camera in cameras() {
+            for [x, y, a, b, t, ..] in numbers(100) {
+                let ray = camera.ray([x, y], [a, b]);
+                let p = ray.origin + ray.direction * (ray.tfar * (0.1 + 0.8 * t));
+                let across = |film: [f32; 2]| {
+                    let other = camera.ray(film, [a, b]);
+                    let n = ray.direction;
+                    other.origin + other.direction * ((p - other.origin).dot(n) / other.direction.dot(n)) - p
+                };
+                let along_x = (across([x + STEP, y]) - across([x - STEP, y])) / (2.0 * STEP);
+                let along_y = (across([x, y + STEP]) - across([x, y - STEP])) / (2.0 * STEP);
+                let (got, expected) = (camera.density(p, [a, b]), 1.0 / along_x.cross(along_y).length());
+                assert!((got / expected - 1.0).abs() < 3e-3, "{got} for {expected} at ({x}, {y}) by {camera:?}");
+            }
+        }
     }
 }

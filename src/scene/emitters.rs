@@ -110,6 +110,7 @@ impl Emitters {
         let emission = self.lights[light].emit::<P>(place, direction, self.ball)?;
         Some(Emission {
             weight: emission.weight / probability,
+            of_place: emission.of_place / probability,
             pdf_place: emission.pdf_place * probability,
             light: light as u32,
             ..emission
@@ -139,7 +140,7 @@ impl Emitters {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::Mat3;
 
     use super::*;
@@ -154,7 +155,7 @@ mod tests {
     };
 
     /// Lights that surfaces or directions can hit, one of each kind, around the origin's upper hemisphere.
-    fn lights() -> Vec<Light> {
+    pub fn lights() -> Vec<Light> {
         let corners = vec![Vec3::new(-1.0, -1.0, 2.0), Vec3::new(1.0, -1.0, 2.0), Vec3::new(0.0, 1.0, 3.0)];
         let white = Varying::Constant(Rgb::ONE);
         let sphere = |center: Vec3, radius: f32, flipped: bool| {

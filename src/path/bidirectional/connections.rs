@@ -176,10 +176,7 @@ pub(super) fn lamp_to_camera(
     if shading.dot(sight.direction) <= 0.0 {
         return None;
     }
-    // the emission's weight is radiance · |cos| over its densities
-    let cos_emitted = geometric.dot(emission.direction).abs();
-    let radiance_over_density = emission.weight * (emission.pdf_rest / cos_emitted);
-    let contribution = radiance_over_density * (cos * sight.density);
+    let contribution = emission.of_place * (cos * sight.density);
     let facing = geometric * geometric.dot(sight.direction).signum();
     let origin = crate::math::offset_origin(emission.origin, facing);
     (contribution != Rgb::ZERO).then_some(Seen {

@@ -222,6 +222,9 @@ fn start_at_light<P: Profile, const ONE: bool>(
         if let Some(seen) = connections::lamp_to_camera(scene, techniques, &emission, w.lens[lane as usize]) {
             w.waiting.add_splat(lane, &seen);
         }
+        if emission.weight == Rgb::ZERO {
+            continue;
+        }
         w.lanes[kept] = lane;
         kept += 1;
         w.rays.push(subpath::start_of(&emission), emission.direction, f32::MAX);

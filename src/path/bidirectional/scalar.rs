@@ -96,6 +96,9 @@ impl Point<'_> {
         if let Some(seen) = connections::lamp_to_camera(self.scene(), techniques, &emission, self.lens) {
             self.splat(&seen, 1.0);
         }
+        if emission.weight == Rgb::ZERO {
+            return;
+        }
         let mut particle = Particle::new(emission.weight);
         let (mut origin, mut direction, mut step) = (subpath::start_of(&emission), emission.direction, None);
         for j in 1..layout.max_depth() {

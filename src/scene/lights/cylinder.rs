@@ -72,7 +72,7 @@ impl Emit for Cylinder {
     #[inline(always)]
     fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
         let (q, normals, radiance) = self.place(place);
-        from_surface(q, normals, radiance, 1.0 / self.area(), direction)
+        Some(from_surface(q, normals, radiance, 1.0 / self.area(), direction))
     }
 
     #[inline(always)]

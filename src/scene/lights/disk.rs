@@ -68,7 +68,7 @@ impl Emit for Disk {
     #[inline(always)]
     fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
         let (q, normals, radiance) = self.place(place);
-        from_surface(q, normals, radiance, self.pdf_area(), direction)
+        Some(from_surface(q, normals, radiance, self.pdf_area(), direction))
     }
 
     #[inline(always)]

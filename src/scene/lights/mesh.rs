@@ -76,7 +76,7 @@ impl Emit for MeshLight {
     #[inline(always)]
     fn emit(&self, place: [f32; 2], direction: [f32; 2], _scene: Ball) -> Option<Emission> {
         let (q, normals, radiance) = self.place(place);
-        from_surface(q, normals, radiance, self.inverse_area, direction)
+        Some(from_surface(q, normals, radiance, self.inverse_area, direction))
     }
 
     #[inline(always)]

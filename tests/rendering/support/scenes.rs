@@ -5,8 +5,8 @@ use std::sync::{OnceLock, atomic::AtomicBool};
 
 use relt::embree::{Device, Width};
 use relt::film::Image;
-use relt::path::Widths;
-use relt::render::{Job, Method, Observer, Outcome, PacketChoice, Settings, run};
+use relt::path::{MappingKind, Widths};
+use relt::render::{Job, MappingChoice, Method, Observer, Outcome, PacketChoice, Settings, run};
 use relt::scene::Scene;
 
 /// The repository's own scenes.
@@ -49,6 +49,7 @@ pub fn settings(method: Method, mutations_per_pixel: f64, seed: u64) -> Settings
     Settings {
         method,
         seed,
+        mapping: MappingChoice::Fixed(MappingKind::Unidirectional),
         threads: Some(1),
         mutations_per_pixel: Some(mutations_per_pixel),
         packet: PacketChoice::Fixed(Width::W8),
