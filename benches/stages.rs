@@ -80,7 +80,7 @@ struct DrawOnly {
 
 impl DrawOnly {
     fn like(points: &Points) -> DrawOnly {
-        let lanes = |block| (0..LANES as u32).filter(|&lane| points.used(lane as usize) > block).collect();
+        let lanes = |block| (0..LANES as u32).filter(|&lane| points.has(block, lane as usize)).collect();
         DrawOnly { lanes: (0..).map(lanes).take_while(|lanes: &Vec<u32>| !lanes.is_empty()).collect() }
     }
 }
