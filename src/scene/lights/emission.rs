@@ -99,6 +99,9 @@ fn shining_side([geometric, shading]: [Vec3; 2]) -> Vec3 {
 
 /// From the place `q` of a surface that emits `radiance`, chosen with density `pdf_area`: a direction around the
 /// geometric normal of the shining side in proportion to its cosine; `None` where that is behind the shading normal.
+///
+/// [`Light::sample`](super::Light::sample) goes by the shading normal alone: where that leans, it also finds light behind
+/// the geometric one, which no subpath starts with ([`surface_pdf`] is 0 there).
 #[inline(always)]
 pub(super) fn from_surface(
     q: Vec3,
@@ -374,10 +377,11 @@ mod tests {
 
     #[test]
     fn the_choice_of_the_light_is_part_of_place_and_weight() {
-        let (emitters, _) = Emitters::new(&with_lights(lights()), SCENE);
+        let lights = lights();
+        let (emitters, _) = Emitters::new(&with_lights(lights.clone()), SCENE);
         let ball = SCENE.enlarged();
         assert_eq!(emitters.surrounding_light(), Some(0));
-        let mut met = vec![false; lights().len()];
+        let mut met = vec![false; lights.len()];
         let rng = Rng::new(23);
         for step in 0..4096 {
             let counter = Counter { ladder: 0, replica: 0, step, purpose: Purpose::Primary };
@@ -385,7 +389,7 @@ mod tests {
             let [choice, ..] = rng.words(counter, 1).map(unit_f32);
             let Some(e) = emitters.emit::<FullProfile>([a, b], [c, d], choice) else { continue };
             met[e.light as usize] = true;
-            let alone = lights()[e.light as usize].emit::<FullProfile>([a, b], [c, d], ball).unwrap();
+            let alone = lights[e.light as usize].emit::<FullProfile>([a, b], [c, d], ball).unwrap();
             let probability = e.pdf_place / alone.pdf_place;
             assert!((e.weight * probability / alone.weight - Rgb::ONE).abs().max_element() < 1e-5, "{e:?}, {alone:?}");
             assert_eq!((e.pdf_rest, e.kind), (alone.pdf_rest, emitters.kind(e.light)));
