@@ -275,23 +275,44 @@ mod tests {
         }
     }
 
+    /// Integral over all directions by midpoints.
+    fn all_around(of: impl Fn(Vec3) -> Rgb) -> glam::DVec3 {
+        let (rows, columns) = (1000, 2000);
+        let mut sum = glam::DVec3::ZERO;
+        for i in 0..rows * columns {
+            let [row, column] = [i / columns, i % columns].map(|i| i as f32 + 0.5);
+            sum += of(warp::sphere([column / columns as f32, row / rows as f32])).as_dvec3();
+        }
+        sum * (4.0 * std::f64::consts::PI / f64::from(rows * columns))
+    }
+
+    /// By midpoints, bound 3·10⁻³ for the edges of cones.
+    #[test]
+    fn the_density_of_directions_integrates_to_one() {
+        for light in lights() {
+            let normals = [Vec3::new(0.6, 0.0, 0.8); 2];
+            let of_direction = match light.kind() {
+                EmitterKind::Surface | EmitterKind::Point => 1,
+                EmitterKind::Surrounding => 0,
+                EmitterKind::SingleDirection => continue,
+            };
+            let density = |d| light.emission_pdf::<FullProfile>(normals, d, SCENE)[of_direction];
+            let one = all_around(|d| Rgb::splat(density(d))).x;
+            assert!((one - 1.0).abs() < 3e-3, "{one}: {light:?}");
+        }
+    }
+
     /// Intensity or radiance integrated numerically where [`Light::power`] is approximate, else that.
     fn power(light: &Light) -> glam::DVec3 {
-        let all_around = |of: &dyn Fn(Vec3) -> Rgb| {
-            let (rows, columns) = (1000, 2000);
-            let mut sum = glam::DVec3::ZERO;
-            for i in 0..rows * columns {
-                let [row, column] = [i / columns, i % columns].map(|i| i as f32 + 0.5);
-                sum += of(warp::sphere([column / columns as f32, row / rows as f32])).as_dvec3();
+        match light {
+            Light::Envmap(_) => all_around(|d| light.surrounding(d).0) / f64::from(SCENE.pdf()),
+            Light::Spot(_) => {
+                let origin = emissions(light, 0, 64).find_map(|(e, _)| e).unwrap().origin;
+                // as seen from distance 1
+                all_around(|d| light.sample::<FullProfile>(origin + d, -d, [0.0; 2]).map_or(Rgb::ZERO, |s| s.weight))
             }
-            sum * (4.0 * std::f64::consts::PI / f64::from(rows * columns))
-        };
-        let EmitterKind::Point = light.kind() else {
-            let Light::Envmap(_) = light else { return light.power(SCENE.radius).as_dvec3() };
-            return all_around(&|d| light.surrounding(d).0) / f64::from(SCENE.pdf());
-        };
-        let origin = emissions(light, 0, 64).find_map(|(e, _)| e).unwrap().origin;
-        all_around(&|d| light.sample::<FullProfile>(origin + d, -d, [0.0; 2]).map_or(Rgb::ZERO, |s| s.weight))
+            _ => light.power(SCENE.radius).as_dvec3(),
+        }
     }
 
     /// Mean of weights against power: 2¹⁶ samples of each of 11 lights, bound five standard errors (level 6·10⁻⁷ each)
