@@ -437,7 +437,7 @@ mod tests {
                 for projection in
                     [eye([0.0; 2], None), eye([0.2, -0.1], None), eye([-0.1, 0.15], lens), Projection::Orthographic]
                 {
-                    cameras.push(seen_from(to_world, projection, film.clone()));
+                    cameras.push(seen_from(to_world, projection, film));
                 }
             }
         }

@@ -67,8 +67,8 @@ impl LightSample {
     }
 }
 
-/// Keeps shadow rays from meeting the light itself.
-pub(crate) const SHORT_OF_LIGHT: f32 = 0.9999;
+/// Keeps shadow rays from meeting the light itself: their length over the distance of the sampled place.
+pub const SHORT_OF_LIGHT: f32 = 0.9999;
 
 /// A kind of light.
 trait Emit {

@@ -14,7 +14,8 @@ use crate::{
 };
 
 /// A sphere that emits from its outside (from its inside, if flipped): uniform over the solid angle under which it is
-/// seen from outside, uniform over its area from inside and where light paths start. Source: Shirley, Wang & Zimmerman 1996, section 3.2.
+/// seen from outside, uniform over its area from inside and where light subpaths start.
+/// Source: Shirley, Wang & Zimmerman 1996, section 3.2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre.

@@ -21,8 +21,6 @@ pub struct Spot {
     axis: Vec3,
     cos_beam: f32,
     cos_cutoff: f32,
-    /// 1 − cos of the cutoff, as 2 sin² of its half, which keeps the digits of narrow cones.
-    one_minus_cos: f32,
     /// Radians.
     cutoff: f32,
     /// 1/(cutoff − beam width), per radian.
@@ -54,16 +52,15 @@ impl Spot {
     pub fn new(point: Point, axis: Vec3, beam: f32, cutoff: f32) -> Spot {
         let (beam, cutoff) = (beam.to_radians(), cutoff.to_radians());
         let cos = |angle: f32| libm::cosf(angle);
-        let sin_half = libm::sinf(0.5 * cutoff);
-        Spot {
-            point,
-            axis,
-            cos_beam: cos(beam),
-            cos_cutoff: cos(cutoff),
-            one_minus_cos: 2.0 * sin_half * sin_half,
-            cutoff,
-            steepness: 1.0 / (cutoff - beam),
-        }
+        Spot { point, axis, cos_beam: cos(beam), cos_cutoff: cos(cutoff), cutoff, steepness: 1.0 / (cutoff - beam) }
+    }
+
+    /// 1 − cos of the cutoff, as 2 sin² of its half, which keeps the digits of narrow cones. (Not kept: checksums of
+    /// scenes are over all fields, and those of old files must not change.)
+    #[inline(always)]
+    fn one_minus_cos(&self) -> f32 {
+        let sin_half = libm::sinf(0.5 * self.cutoff);
+        2.0 * sin_half * sin_half
     }
 
     /// Intensity in a direction at that cosine from the axis, by that on it.
@@ -104,7 +101,7 @@ impl Emit for Spot {
 
     #[inline(always)]
     fn emit(&self, _place: [f32; 2], direction: [f32; 2], scene: Ball) -> Option<Emission> {
-        let direction = Frame::new(self.axis).to_world(warp::cone(direction, self.one_minus_cos));
+        let direction = Frame::new(self.axis).to_world(warp::cone(direction, self.one_minus_cos()));
         let falloff = self.falloff(direction.dot(self.axis));
         let [_, pdf] = self.emission_pdf([Vec3::ZERO; 2], direction, scene);
         (falloff > 0.0).then(|| from_point(self.point.position, direction, self.point.intensity * falloff, pdf))
@@ -113,7 +110,7 @@ impl Emit for Spot {
     /// Directions are uniform over the cone of the cutoff.
     #[inline(always)]
     fn emission_pdf(&self, _normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
-        [1.0, if direction.dot(self.axis) > self.cos_cutoff { 1.0 / (TAU * self.one_minus_cos) } else { 0.0 }]
+        [1.0, if direction.dot(self.axis) > self.cos_cutoff { 1.0 / (TAU * self.one_minus_cos()) } else { 0.0 }]
     }
 }
 
