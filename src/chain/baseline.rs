@@ -52,8 +52,8 @@ pub struct Baseline<W> {
     pub small: (f64, u64),
     /// The same of large steps.
     pub large: (f64, u64),
-    /// Σ g, what they contribute elsewhere included, of the proposals of large steps: over their number, an unbiased estimate of c that is independent of the
-    /// chains' first states.
+    /// Σ g of the proposals of large steps, what they contribute elsewhere included: over their number, an unbiased
+    /// estimate of c that is independent of the chains' first states.
     pub large_sum: f64,
 }
 

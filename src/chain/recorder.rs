@@ -31,9 +31,15 @@ impl Recorder<'_> {
     #[inline(always)]
     pub fn splat_apart(&mut self, [layer, elsewhere]: [usize; 2], whole: Whole, value: f64, weight: f64) {
         self.add(layer, whole.main.splat(), value, weight);
-        for splat in whole.elsewhere {
-            self.add(elsewhere, *splat, value, 0.0);
+        if !whole.elsewhere.is_empty() {
+            self.add_all(elsewhere, whole.elsewhere, value);
         }
+    }
+
+    /// Adds `value` · f of every splat to a layer's image; apart, so that what has none stays small.
+    #[inline(never)]
+    fn add_all(&mut self, layer: usize, splats: &[FilmSplat], value: f64) {
+        splats.iter().for_each(|splat| self.add(layer, *splat, value, 0.0));
     }
 
     /// Adds `value` · f to a layer's image and `weight` to its density.

@@ -134,8 +134,8 @@ impl<W: Default + Send> Planes<'_, W> {
         }
     }
 
-    /// Everything beside the picture: where samples went, and on request E_u, E_e and every rung's part of the balanced
-    /// image; the parts sum to it.
+    /// Everything beside the picture: how many samples lie in each pixel, wherever they contribute, and on request E_u, E_e
+    /// and every rung's part of the balanced image; the parts sum to it.
     fn layers(&self) -> Vec<(String, Plane)> {
         let on = &self.sampler.screen.layers;
         let tempered = self.sums(on.tempered);
