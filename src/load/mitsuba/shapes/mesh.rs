@@ -23,6 +23,9 @@ pub struct RawMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Triangles whose normals are in memory at once: enough to keep many threads busy, and little beside a large mesh.
+const BLOCK: usize = 1 << 15;
+
 /// How to put a mesh into the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
@@ -105,7 +108,11 @@ impl RawMesh {
     /// Leaves those triangles out that [`face_normal`] cannot be told of, and says how many.
     fn drop_triangles_without_area(&mut self) -> Result<usize, String> {
         let (count, positions) = (self.triangles.len(), &self.positions);
-        self.triangles.retain(|triangle| face_normal(triangle.map(|i| positions[i as usize])).is_some());
+        let has_area = |triangle: &[u32; 3]| face_normal(triangle.map(|i| positions[i as usize])).is_some();
+        if self.triangles.par_iter().all(has_area) {
+            return Ok(0);
+        }
+        self.triangles.retain(has_area);
         if self.triangles.is_empty() {
             return Err(format!("none of its {count} triangles has an area"));
         }
@@ -117,13 +124,13 @@ impl RawMesh {
     fn make_smooth_normals(&mut self) {
         let RawMesh { positions, normals, triangles, .. } = self;
         normals.resize(positions.len(), Vec3::ZERO);
-        for triangle in triangles {
-            let corners = triangle.map(|i| positions[i as usize]);
-            let Some(face) = face_normal(corners) else { continue };
-            for (i, vertex) in triangle.iter().enumerate() {
-                let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
-                let angle = libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last));
-                normals[*vertex as usize] += face * angle;
+        // Computed in parallel and added one by one, so that sums do not depend on threads.
+        let mut weighted = Vec::new();
+        for block in triangles.chunks(BLOCK) {
+            let corners = block.par_iter().map(|triangle| triangle.map(|i| positions[i as usize]));
+            corners.map(weighted_normals).collect_into_vec(&mut weighted);
+            for (vertex, normal) in block.iter().zip(&weighted).flat_map(|(triangle, parts)| triangle.iter().zip(parts)) {
+                normals[*vertex as usize] += normal;
             }
         }
         normals.par_iter_mut().for_each(|n| *n = n.normalize_or_zero());
@@ -190,6 +197,15 @@ impl RawMesh {
         debug_assert!(self.uvs.is_empty() || self.uvs.len() == count);
         Ok(())
     }
+}
+
+/// The unit normal times the angle at each corner; 0 where there is no normal.
+fn weighted_normals(corners: [Vec3; 3]) -> [Vec3; 3] {
+    let Some(normal) = face_normal(corners) else { return [Vec3::ZERO; 3] };
+    [0, 1, 2].map(|i| {
+        let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
+        normal * libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last))
+    })
 }
 
 /// Unit normal of a triangle, or `None` where single precision cannot tell it: that is what "no area" means here,
