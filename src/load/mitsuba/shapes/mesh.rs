@@ -129,7 +129,8 @@ impl RawMesh {
         for block in triangles.chunks(BLOCK) {
             let corners = block.par_iter().map(|triangle| triangle.map(|i| positions[i as usize]));
             corners.map(weighted_normals).collect_into_vec(&mut weighted);
-            for (vertex, normal) in block.iter().zip(&weighted).flat_map(|(triangle, parts)| triangle.iter().zip(parts)) {
+            for (vertex, normal) in block.iter().zip(&weighted).flat_map(|(triangle, parts)| triangle.iter().zip(parts))
+            {
                 normals[*vertex as usize] += normal;
             }
         }
