@@ -23,8 +23,9 @@ pub struct RawMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Triangles whose normals are in memory at once: enough to keep many threads busy, and little beside a large mesh.
-const BLOCK: usize = 1 << 15;
+/// Triangles whose normals are in memory at once: enough to keep many threads busy, and so few that they stay in the
+/// cache between those threads and the one that adds.
+const BLOCK: usize = 1 << 13;
 
 /// How to put a mesh into the world.
 #[derive(Clone, Copy, Debug)]
@@ -218,5 +219,34 @@ fn face_normal([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
 impl From<(Mesh, Repairs)> for Built {
     fn from((mesh, repairs): (Mesh, Repairs)) -> Built {
         Built { geometry: ShapeGeometry::Mesh(Arc::new(mesh)), repairs }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smooth_normals_are_sums_in_the_order_of_the_triangles() {
+        const VERTICES: u32 = 1000;
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            state >> 8
+        };
+        let mut coordinate = || next() as f32 * 2f32.powi(-24);
+        let positions = (0..VERTICES).map(|_| Vec3::from([0; 3].map(|_| coordinate()))).collect();
+        // some of them without area
+        let triangles = (0..5 * BLOCK / 2).map(|_| [0; 3].map(|_| next() % VERTICES)).collect();
+        let mut raw = RawMesh { positions, triangles, ..RawMesh::default() };
+
+        let mut expected = vec![Vec3::ZERO; VERTICES as usize];
+        for triangle in &raw.triangles {
+            let weighted = weighted_normals(triangle.map(|i| raw.positions[i as usize]));
+            (0..3).for_each(|i| expected[triangle[i] as usize] += weighted[i]);
+        }
+        raw.make_smooth_normals();
+        let expected: Vec<_> = expected.into_iter().map(Vec3::normalize_or_zero).collect();
+        assert_eq!(raw.normals, expected);
     }
 }
