@@ -3,6 +3,7 @@
 use glam::{Affine3A, DVec3, Mat3A, Vec3};
 use relt::embree::{Device, Geometry, Hit, Hits, MISS, Rays, Scene, Width};
 use relt::scene::Mesh;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
@@ -578,6 +579,44 @@ fn building_twice_gives_the_same_hits_on_edges() {
     assert!(hits[0] == hits[1]);
 }
 
+/// Each number of threads in a process of its own: devices of one process share their threads.
+#[test]
+fn hits_do_not_depend_on_the_number_of_threads_that_build() {
+    let child = |threads: usize| {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "child_builds_and_traces", "--ignored", "--nocapture"]);
+        let output = command.env("RELT_BUILD_THREADS", threads.to_string()).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        said.lines().filter(|line| line.starts_with("hits: ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let expected = child(1);
+    assert_eq!(expected.len(), 18, "six scenes, three kinds of rays");
+    for threads in [2, 3, 8, 2] {
+        assert_eq!(child(threads), expected, "built on {threads} threads");
+    }
+}
+
+#[test]
+#[ignore = "the child of the test above"]
+fn child_builds_and_traces() {
+    let threads = std::env::var("RELT_BUILD_THREADS").unwrap().parse().unwrap();
+    let device = Device::on_threads(threads, "").unwrap();
+    let (mut hits, mut occluded) = (Hits::default(), Vec::new());
+    for name in SCENES.into_iter().chain(["quadrics", "instances", "layers"]) {
+        let scene = Scene::new(&device, geometries(&device, name)).unwrap();
+        for (kind, make) in RAY_KINDS {
+            let rays = make(&scene, &mut Random(16), 100_000);
+            scene.closest(Width::W8, &rays, &mut hits);
+            scene.occluded(Width::W8, &rays, &mut occluded);
+            let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            let mut hasher = DefaultHasher::new();
+            (&hits.geometry, &hits.primitive, &hits.instance, &occluded).hash(&mut hasher);
+            (bits(&hits.t), bits(&hits.u), bits(&hits.v)).hash(&mut hasher);
+            println!("\nhits: {name} {kind} {:x}", hasher.finish());
+        }
+    }
+}
+
 #[test]
 fn building_and_tracing_leave_arithmetic_on_denormal_numbers_alone() {
     let scene = Scene::new(&device(), meshes("cornell-box")).unwrap();
@@ -652,6 +691,7 @@ fn geometries(device: &Device, name: &str) -> Vec<Geometry> {
     match name {
         "quadrics" => quadrics(),
         "instances" => instances(device),
+        "layers" => layers(),
         _ => meshes(name),
     }
 }
@@ -754,6 +794,28 @@ fn load(file: &Path) -> Mesh {
     let mesh = &models[0].mesh;
     let positions = mesh.positions.as_chunks().0.iter().map(|&p: &[f32; 3]| Vec3::from(p)).collect();
     Mesh::new(positions, mesh.indices.as_chunks().0.to_vec())
+}
+
+/// Triangles anywhere in two meshes, each of them eight times and in no order: every ray that hits one hits eight at
+/// once, and only the hierarchy says which of them counts.
+fn layers() -> Vec<Geometry> {
+    const TRIANGLES: usize = 160_000;
+    const LAYERS: usize = 8;
+    let mut random = Random(17);
+    let mut positions = Vec::new();
+    for _ in 0..TRIANGLES / LAYERS {
+        let center = random.cube();
+        positions.extend([0; 3].map(|_| center + 0.05 * random.direction()));
+    }
+    let mut triangles: Vec<_> = (0..TRIANGLES as u32)
+        .map(|i| 3 * (i % (TRIANGLES / LAYERS) as u32))
+        .map(|first| [first, first + 1, first + 2])
+        .collect();
+    for i in (1..TRIANGLES).rev() {
+        triangles.swap(i, random.below(i + 1));
+    }
+    let mesh = |triangles: &[_]| Geometry::Triangles(Arc::new(Mesh::new(positions.clone(), triangles.to_vec())));
+    triangles.chunks(TRIANGLES / 2).map(mesh).collect()
 }
 
 /// Spheres, disks and cylinders of all sizes, some within others, in a box of triangles.

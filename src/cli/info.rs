@@ -27,7 +27,7 @@ pub(super) fn run(arguments: Info) -> Result<(), Failure> {
         faults if faults.is_empty() => {}
         faults => return Err(Failure::Input(faults)),
     }
-    let opened = arguments.scene.open(false)?;
+    let opened = arguments.scene.open(None, false)?;
     // Whoever reads may have read enough, as `head` does.
     drop(write!(io::stdout(), "{}", report(&opened)));
     Ok(())

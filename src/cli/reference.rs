@@ -85,11 +85,11 @@ pub(super) fn run(arguments: Reference) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = arguments.settings()?;
     let files = Files::new(&arguments.output)?;
-    let description = arguments.scene.describe(arguments.quiet)?;
+    let description = arguments.scene.describe(arguments.threads, arguments.quiet)?;
     let recipe = arguments.recipe(&description);
     let mut passes = files.passes(&recipe)?;
 
-    let opened = Opened::of(description, arguments.quiet)?;
+    let opened = Opened::of(description, arguments.threads, arguments.quiet)?;
     let stop = signals::stop_flag()?;
     let progress = ReferenceProgress::new(arguments.quiet, arguments.target_relmse, &passes, begin);
     opened.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));

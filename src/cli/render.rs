@@ -128,7 +128,7 @@ pub(super) struct Render {
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let output = arguments.output()?;
-    let opened = arguments.scene.open(arguments.quiet)?;
+    let opened = arguments.scene.open(arguments.threads, arguments.quiet)?;
     let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());

@@ -1,6 +1,7 @@
 //! Scene files, as every subcommand takes them.
 
 use std::path::PathBuf;
+use std::thread::available_parallelism;
 
 use clap::Args;
 
@@ -41,22 +42,26 @@ impl SceneArguments {
             .collect()
     }
 
-    /// Reads the file and builds the scene; shows how far that is, unless `quiet`.
-    pub fn open(&self, quiet: bool) -> Result<Opened, Failure> {
-        Opened::of(self.describe(quiet)?, quiet)
+    /// Reads the file and builds the scene, on so many threads or as many as the machine runs at once; shows how far that
+    /// is, unless `quiet`.
+    pub fn open(&self, threads: Option<usize>, quiet: bool) -> Result<Opened, Failure> {
+        Opened::of(self.describe(threads, quiet)?, threads, quiet)
     }
 
-    /// Reads the file; shows how far that is, unless `quiet`.
-    pub fn describe(&self, quiet: bool) -> Result<SceneDescription, Failure> {
+    /// The first half of [`open`](Self::open): reads the file.
+    pub fn describe(&self, threads: Option<usize>, quiet: bool) -> Result<SceneDescription, Failure> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(number(threads)).thread_name(|i| format!("load {i}"));
+        let pool = pool.build().map_err(Failure::running)?;
         let watch = Watch::default();
-        loading::shown(!quiet, &watch, || load::watched(&self.path, &self.defines, &watch)).map_err(Failure::shown)
+        let load = || pool.install(|| load::watched(&self.path, &self.defines, &watch));
+        loading::shown(!quiet, &watch, load).map_err(Failure::shown)
     }
 }
 
 impl Opened {
-    /// Builds a scene; shows how far that is, unless `quiet`.
-    pub fn of(description: SceneDescription, quiet: bool) -> Result<Opened, Failure> {
-        let device = Device::new("").map_err(Failure::input)?;
+    /// The second half of [`SceneArguments::open`]: builds the scene.
+    pub fn of(description: SceneDescription, threads: Option<usize>, quiet: bool) -> Result<Opened, Failure> {
+        let device = Device::on_threads(number(threads), "").map_err(Failure::input)?;
         let warnings = description.warnings.clone();
         let building = Building::new(Features::of(&description).triangles);
         let scene =
@@ -64,4 +69,9 @@ impl Opened {
         let scene = scene.map_err(Failure::running)?;
         Ok(Opened { device, scene, warnings })
     }
+}
+
+/// The threads that are asked for, or as many as the machine runs at once.
+fn number(threads: Option<usize>) -> usize {
+    threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from))
 }

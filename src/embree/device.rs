@@ -5,10 +5,10 @@ use super::library::{Embree, EmbreeError, embree, error_in_words};
 use super::packet::Width;
 use std::ffi::{CString, c_int};
 use std::sync::Arc;
+use std::thread::available_parallelism;
 
-/// Hierarchies are built on one thread: built on several, their shape depends on scheduling, and with it which of
-/// two triangles a ray through their common edge hits. Affinity is ours to set, not Embree's.
-const OPTIONS: &str = "threads=1,set_affinity=0";
+/// Options of every device: affinity is ours to set, not Embree's.
+const OPTIONS: &str = "set_affinity=0";
 
 /// Embree, loaded and started. Clones share it.
 #[derive(Clone)]
@@ -32,10 +32,21 @@ impl Drop for Owned {
 }
 
 impl Device {
-    /// Loads Embree and starts it with additional options of `rtcNewDevice`, such as `isa=avx2`, or none.
+    /// As [`on_threads`](Self::on_threads), with as many threads as the machine runs at once.
     pub fn new(config: &str) -> Result<Device, EmbreeError> {
+        Device::on_threads(available_parallelism().map_or(1, usize::from), config)
+    }
+
+    /// Loads Embree and starts it with additional options of `rtcNewDevice`, such as `isa=avx2`, or none. Hierarchies
+    /// will be built on so many threads, 1 or more, of which the one that asks is the first; the others sleep otherwise.
+    ///
+    /// The number of threads does not show: Embree splits by counts, least and greatest values, which are exact in any
+    /// order, and sorts the triangles of a leaf by their numbers. So even those rays find the same triangle that hit
+    /// several at once.
+    pub fn on_threads(threads: usize, config: &str) -> Result<Device, EmbreeError> {
         let embree = embree()?;
-        let config = if config.is_empty() { OPTIONS.to_owned() } else { format!("{OPTIONS},{config}") };
+        let separator = if config.is_empty() { "" } else { "," };
+        let config = format!("threads={threads},{OPTIONS}{separator}{config}");
         let options = CString::new(config.clone())
             .map_err(|_| EmbreeError::Device { config: config.clone(), reason: "the options hold a zero byte" })?;
         // SAFETY: a C string that outlives the call.

@@ -107,7 +107,8 @@ impl Scene {
         Scene::watched(device, geometries, &|_| ())
     }
 
-    /// As [`new`](Self::new); `watch` is told, now and then, how much of the hierarchy is built, 0 to 1.
+    /// As [`new`](Self::new); `watch` is told, now and then and by several threads, how much of the hierarchy is built,
+    /// 0 to 1.
     pub fn watched(
         device: &Device,
         geometries: Vec<Geometry>,
@@ -134,8 +135,8 @@ impl Scene {
         for (id, shape) in (0..).zip(&scene.shapes) {
             scene.attach(shape, id).map_err(failed)?;
         }
-        // SAFETY: as above; the buffers that Embree reads from now on are held by `shapes`, and `watch` outlives the
-        // commit, after which nobody calls it.
+        // SAFETY: as above; the buffers and quadrics that Embree reads from now on, on several threads, are held by
+        // `shapes`, and `watch` is `Sync` and outlives the commit, after which nobody calls it.
         unsafe {
             (functions.set_progress_monitor)(handle, Some(tell), ptr::from_ref(&watch).cast_mut().cast());
             (functions.commit_scene)(handle);

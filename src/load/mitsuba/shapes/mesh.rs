@@ -23,6 +23,10 @@ pub struct RawMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Triangles whose normals are in memory at once: enough to keep many threads busy, and so few that they stay in the
+/// cache between those threads and the one that adds.
+const BLOCK: usize = 1 << 13;
+
 /// How to put a mesh into the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
@@ -105,7 +109,11 @@ impl RawMesh {
     /// Leaves those triangles out that [`face_normal`] cannot be told of, and says how many.
     fn drop_triangles_without_area(&mut self) -> Result<usize, String> {
         let (count, positions) = (self.triangles.len(), &self.positions);
-        self.triangles.retain(|triangle| face_normal(triangle.map(|i| positions[i as usize])).is_some());
+        let has_area = |triangle: &[u32; 3]| face_normal(triangle.map(|i| positions[i as usize])).is_some();
+        if self.triangles.par_iter().all(has_area) {
+            return Ok(0);
+        }
+        self.triangles.retain(has_area);
         if self.triangles.is_empty() {
             return Err(format!("none of its {count} triangles has an area"));
         }
@@ -117,13 +125,14 @@ impl RawMesh {
     fn make_smooth_normals(&mut self) {
         let RawMesh { positions, normals, triangles, .. } = self;
         normals.resize(positions.len(), Vec3::ZERO);
-        for triangle in triangles {
-            let corners = triangle.map(|i| positions[i as usize]);
-            let Some(face) = face_normal(corners) else { continue };
-            for (i, vertex) in triangle.iter().enumerate() {
-                let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
-                let angle = libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last));
-                normals[*vertex as usize] += face * angle;
+        // Computed in parallel and added one by one, so that sums do not depend on threads.
+        let mut weighted = Vec::new();
+        for block in triangles.chunks(BLOCK) {
+            let corners = block.par_iter().map(|triangle| triangle.map(|i| positions[i as usize]));
+            corners.map(weighted_normals).collect_into_vec(&mut weighted);
+            for (vertex, normal) in block.iter().zip(&weighted).flat_map(|(triangle, parts)| triangle.iter().zip(parts))
+            {
+                normals[*vertex as usize] += normal;
             }
         }
         normals.par_iter_mut().for_each(|n| *n = n.normalize_or_zero());
@@ -192,6 +201,15 @@ impl RawMesh {
     }
 }
 
+/// The unit normal times the angle at each corner; 0 where there is no normal.
+fn weighted_normals(corners: [Vec3; 3]) -> [Vec3; 3] {
+    let Some(normal) = face_normal(corners) else { return [Vec3::ZERO; 3] };
+    [0, 1, 2].map(|i| {
+        let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
+        normal * libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last))
+    })
+}
+
 /// Unit normal of a triangle, or `None` where single precision cannot tell it: that is what "no area" means here,
 /// since intersection and shading compute it like this.
 fn face_normal([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
@@ -201,5 +219,34 @@ fn face_normal([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
 impl From<(Mesh, Repairs)> for Built {
     fn from((mesh, repairs): (Mesh, Repairs)) -> Built {
         Built { geometry: ShapeGeometry::Mesh(Arc::new(mesh)), repairs }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smooth_normals_are_sums_in_the_order_of_the_triangles() {
+        const VERTICES: u32 = 1000;
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            state >> 8
+        };
+        let mut coordinate = || next() as f32 * 2f32.powi(-24);
+        let positions = (0..VERTICES).map(|_| Vec3::from([0; 3].map(|_| coordinate()))).collect();
+        // some of them without area
+        let triangles = (0..5 * BLOCK / 2).map(|_| [0; 3].map(|_| next() % VERTICES)).collect();
+        let mut raw = RawMesh { positions, triangles, ..RawMesh::default() };
+
+        let mut expected = vec![Vec3::ZERO; VERTICES as usize];
+        for triangle in &raw.triangles {
+            let weighted = weighted_normals(triangle.map(|i| raw.positions[i as usize]));
+            (0..3).for_each(|i| expected[triangle[i] as usize] += weighted[i]);
+        }
+        raw.make_smooth_normals();
+        let expected: Vec<_> = expected.into_iter().map(Vec3::normalize_or_zero).collect();
+        assert_eq!(raw.normals, expected);
     }
 }

@@ -5,45 +5,72 @@
 //! backwards from −1. Without any normals in the file smooth ones are computed, as in Mitsuba, unless `face_normals`. Among
 //! faces with normals one without is flat, and among corners with texture coordinates one without has (0, 0); of that
 //! Mitsuba makes nothing.
+//!
+//! The text is read in pieces of whole lines. What a line says by itself is found out in parallel; what it means among
+//! those before it, one line after the other. Lines that are not plain — faulty, or joined by backslashes — are left to
+//! the second step altogether, so that faults are found in their order.
 
 mod corners;
+mod piece;
 
-use std::io::BufRead;
+use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::super::parameters::ElementParameters;
 use super::mesh::RawMesh;
 use super::{Build, mesh_file};
 use corners::{Corner, Corners};
+use piece::{Numbers, Piece, Said};
 
 /// Reads the element; the file is read by what it returns.
 pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
     mesh_file(p, folder, Some(true), |source| parse(source))
 }
 
+/// Bytes of a piece: many lines, and so few that pieces for all threads are little beside a large mesh.
+const PIECE: usize = 1 << 15;
+/// Pieces at once, for each thread: so that none waits long for the last.
+const PIECES_A_THREAD: usize = 4;
+
 /// The text of a file as one mesh.
 fn parse(source: &mut impl BufRead) -> Result<RawMesh, String> {
+    parse_in_pieces(source, PIECE)
+}
+
+/// The same with pieces of that many bytes or little more.
+fn parse_in_pieces(source: &mut impl BufRead, bytes: usize) -> Result<RawMesh, String> {
     let mut file = Content::default();
-    let mut line = Vec::new();
-    let mut number = 0;
+    let mut pieces = vec![Piece::default(); PIECES_A_THREAD * rayon::current_num_threads()];
+    let mut lines = 0;
     loop {
-        line.clear();
-        match read_line(source, &mut line) {
-            Ok(0) => break,
-            Ok(lines) => {
-                file.line(&line).map_err(|message| format!("line {}: {message}: {:?}", number + 1, shown(&line)))?;
-                number += lines;
-            }
-            Err(error) => return Err(error.to_string()),
+        let mut count = 0;
+        while count < pieces.len() && fill(&mut pieces[count].text, source, bytes).map_err(|e| e.to_string())? {
+            count += 1;
+        }
+        if count == 0 {
+            return Ok(file.corners.finish(file.positions, file.normals, file.uvs, file.triangles));
+        }
+        pieces[..count].par_iter_mut().for_each(Piece::read);
+        for piece in &pieces[..count] {
+            file.take(piece, lines)?;
+            lines += piece.lines;
         }
     }
-    Ok(file.corners.finish(file.positions, file.normals, file.uvs, file.triangles))
+}
+
+/// Replaces a text by that many next bytes of a source, and those up to the end of the line; false where there is none.
+fn fill(text: &mut Vec<u8>, source: &mut impl BufRead, bytes: usize) -> io::Result<bool> {
+    text.clear();
+    source.by_ref().take(bytes as u64).read_to_end(text)?;
+    while source.read_until(b'\n', text)? > 0 && text.trim_ascii_end().ends_with(b"\\") {}
+    Ok(!text.is_empty())
 }
 
 /// Appends the next line, with those that a backslash at its end joins to it; how many these are, 0 at the end.
-fn read_line(source: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<usize> {
+fn read_line(source: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
     let mut lines = 0;
     while source.read_until(b'\n', line)? > 0 {
         lines += 1;
@@ -72,10 +99,47 @@ struct Content {
     triangles: Vec<[u32; 3]>,
 }
 
+/// Numbers of positions, texture coordinates and normals so far.
+type Counts = [usize; 3];
+
 impl Content {
+    /// Adds what a piece says behind that many lines.
+    fn take(&mut self, piece: &Piece, lines_before: usize) -> Result<(), String> {
+        let mut corners = piece.corners.iter();
+        for (start, said) in &piece.said {
+            if !self.add(*said, &mut corners) {
+                let (before, mut text) = piece.text.split_at(*start as usize);
+                let mut line = Vec::new();
+                read_line(&mut text, &mut line).map_err(|error| error.to_string())?;
+                let number = || lines_before + before.iter().filter(|b| **b == b'\n').count() + 1;
+                self.line(&line).map_err(|message| format!("line {}: {message}: {:?}", number(), shown(&line)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds what a line says, with its corners, which are the next ones; false where the line must be looked at again.
+    #[inline]
+    fn add(&mut self, said: Said, corners: &mut std::slice::Iter<Numbers>) -> bool {
+        match said {
+            Said::Position(position) => push(&mut self.positions, position).is_ok(),
+            Said::Normal(normal) => push(&mut self.normals, normal).is_ok(),
+            Said::Uv(uv) => push(&mut self.uvs, uv).is_ok(),
+            Said::Face(count) => {
+                let (face, rest) = corners.as_slice().split_at(count as usize);
+                *corners = rest.iter();
+                let counts = self.counts();
+                let known = face.iter().map(|numbers| numbers.corner(counts));
+                known.clone().all(|corner| corner.is_some())
+                    && self.face(known.map(|corner| corner.ok_or_else(String::new))).is_ok()
+            }
+            Said::Unclear => false,
+        }
+    }
+
     /// Takes in a line, or says in a few words what is wrong with it.
     fn line(&mut self, line: &[u8]) -> Result<(), String> {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut words = words(line);
         match words.next() {
             Some(b"v") => {
                 let position = numbers(&mut words, 3, "the vertex")?;
@@ -89,17 +153,24 @@ impl Content {
                 let [u, v, _] = numbers(&mut words, 1, "the texture coordinate")?;
                 push(&mut self.uvs, Vec2::new(u, v))
             }
-            Some(b"f") => self.face(words),
+            Some(b"f") => {
+                let counts = self.counts();
+                self.face(words.map(|word| corner(word, counts)))
+            }
             _ => Ok(()),
         }
     }
 
-    fn face<'l>(&mut self, words: impl Iterator<Item = &'l [u8]>) -> Result<(), String> {
+    fn counts(&self) -> Counts {
+        [self.positions.len(), self.uvs.len(), self.normals.len()]
+    }
+
+    #[inline]
+    fn face(&mut self, corners: impl Iterator<Item = Result<Corner, String>>) -> Result<(), String> {
         let mut count = 0;
         let mut fan = [0; 2]; // the first corner and the last
-        for word in words {
-            let corner = self.corner(word)?;
-            let index = self.corners.vertex(corner, self.positions.len())?;
+        for corner in corners {
+            let index = self.corners.vertex(corner?, self.positions.len())?;
             if count > 1 {
                 self.triangles.push([fan[0], fan[1], index]);
             }
@@ -108,23 +179,28 @@ impl Content {
         }
         if count > 2 { Ok(()) } else { Err(format!("the face has {count} corners; it must have 3 or more")) }
     }
+}
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    #[inline]
-    fn corner(&self, word: &[u8]) -> Result<Corner, String> {
-        let mut parts = word.split(|b| *b == b'/');
-        let position = index(parts.next().unwrap_or_default(), self.positions.len(), "vertex")?;
-        let mut optional = |count: usize, what: &str| match parts.next() {
-            None | Some(b"") => Ok(None),
-            Some(part) => index(part, count, what).map(Some),
-        };
-        let uv = optional(self.uvs.len(), "texture coordinate")?;
-        let normal = optional(self.normals.len(), "normal")?;
-        match parts.next() {
-            None => Ok(Corner { position, uv, normal }),
-            Some(_) => Err("a corner is v, v/vt, v//vn or v/vt/vn".into()),
-        }
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+fn corner(word: &[u8], [positions, uvs, normals]: Counts) -> Result<Corner, String> {
+    let mut parts = word.split(|b| *b == b'/');
+    let position = index(parts.next().unwrap_or_default(), positions, "vertex")?;
+    let mut optional = |count: usize, what: &str| match parts.next() {
+        None | Some(b"") => Ok(None),
+        Some(part) => index(part, count, what).map(Some),
+    };
+    let uv = optional(uvs, "texture coordinate")?;
+    let normal = optional(normals, "normal")?;
+    match parts.next() {
+        None => Ok(Corner { position, uv, normal }),
+        Some(_) => Err("a corner is v, v/vt, v//vn or v/vt/vn".into()),
     }
+}
+
+/// The words of a line.
+#[inline]
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 /// Numbers are u32 throughout.
@@ -151,16 +227,21 @@ fn numbers<'l>(words: &mut impl Iterator<Item = &'l [u8]>, least: usize, what: &
 }
 
 /// The place, from 0, that a number from 1 or backwards from −1 stands for among `count`.
-#[inline]
 fn index(word: &[u8], count: usize, what: &str) -> Result<u32, String> {
     let number = std::str::from_utf8(word).ok().and_then(|word| word.parse::<i64>().ok());
     let number = number.ok_or_else(|| format!("{:?} is not a whole number", shown(word)))?;
-    let place = if number > 0 { Some(number - 1) } else { (number < 0).then(|| count as i64 + number) };
-    match place.filter(|place| (0..count as i64).contains(place)) {
-        Some(place) => Ok(place as u32),
+    match place(number, count) {
+        Some(place) => Ok(place),
         None if number == 0 => Err(format!("{what} 0: numbers begin at 1")),
         None => Err(format!("{what} {number} of {count}")),
     }
+}
+
+/// The same of a number that has been read.
+#[inline]
+fn place(number: i64, count: usize) -> Option<u32> {
+    let place = if number > 0 { Some(number - 1) } else { (number < 0).then(|| count as i64 + number) };
+    place.filter(|place| (0..count as i64).contains(place)).map(|place| place as u32)
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@
 //! as in Mitsuba, unless `face_normals`.
 //!
 //! The header is read by ply-rs. The elements are read here, one after the other into the arrays of the mesh: ply-rs
-//! keeps an object for each, which for a mesh of 10 million triangles is three times the size of the mesh.
+//! keeps an object for each, which for a mesh of 10 million triangles is three times the size of the mesh. One thread
+//! does: where each element has a length of its own, the others would have to wait for it, and a binary file takes
+//! 8 ns a number, which is a tenth of what the hierarchy over its triangles takes.
 
 mod values;
 

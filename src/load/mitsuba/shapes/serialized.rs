@@ -6,7 +6,8 @@
 //! version 4 a name that ends with a zero; the number of vertices and of triangles (u64 each); arrays of positions, and as
 //! the flags say normals, texture coordinates and colours (skipped), in single or double precision; corners (u32 each).
 //! All is little endian. Without normals in the file they are computed, unless `face_normals` or a flag of the file says
-//! that faces are flat. Source: the manual of Mitsuba 0.6, section 8.2.3.
+//! that faces are flat. What is compressed can only be read from its beginning, so one thread does.
+//! Source: the manual of Mitsuba 0.6, section 8.2.3.
 
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;

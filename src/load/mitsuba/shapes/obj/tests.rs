@@ -156,3 +156,70 @@ fn another_reader_sees_the_same_corners() {
         assert_eq!(raw.positions.len(), expected.positions.len(), "{layout}: as many vertices");
     }
 }
+
+/// What the same lines give one after the other.
+fn read_line_by_line(text: &str) -> Result<RawMesh, String> {
+    let (mut file, mut source, mut line, mut number) = (Content::default(), text.as_bytes(), Vec::new(), 1);
+    loop {
+        line.clear();
+        match read_line(&mut source, &mut line).unwrap() {
+            0 => return Ok(file.corners.finish(file.positions, file.normals, file.uvs, file.triangles)),
+            lines => {
+                file.line(&line).map_err(|message| format!("line {number}: {message}: {:?}", shown(&line)))?;
+                number += lines;
+            }
+        }
+    }
+}
+
+#[test]
+fn pieces_of_any_size_give_the_mesh_or_the_first_fault_of_the_whole() {
+    const LINES: [&str; 24] = [
+        "v 1 2 3",
+        "v 0.5 -1e2 7 1",
+        "v 4 5 -6",
+        "v 7 \\\n 8 9",
+        "vt 0.5 0.25",
+        "vn 0 0 1",
+        "vn 1 0 0 \\\n\\\n",
+        "f 1 2 3",
+        "f -1 -2 -3",
+        "f 1 \\\n-1 2 3",
+        "f 1//1 2//1 -1//-1",
+        "f 1/1/1 2/1/1 3/1/1 1/1/1",
+        "f 1/1 2/-1 3",
+        "f 1/ 2// +3",
+        "# f 1 \\",
+        "o thing",
+        "",
+        // faults, or some if there is too little before them
+        "f 9 2 30",
+        "f 1/1/1/1 2 3",
+        "f 0 1 2",
+        "f 1 2 9999999999",
+        "f 1 2",
+        "v 1 2",
+        "vn 0 0 inf",
+    ];
+    let mut state = 1u32;
+    let mut below = |n: usize| {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as usize % n
+    };
+    let mut whole = 0;
+    for round in 0..600 {
+        let kinds = if round % 2 == 0 { LINES.len() - 7 } else { LINES.len() };
+        let mut text = format!("{SQUARE}vt 0 1\nvn 0 1 0\n");
+        for _ in 0..below(40) {
+            text += LINES[below(kinds)];
+            text += if below(5) == 0 { "\r\n" } else { "\n" };
+        }
+        let expected = read_line_by_line(&text);
+        whole += usize::from(expected.is_ok());
+        for bytes in [1, 10, 100, PIECE] {
+            let got = parse_in_pieces(&mut text.as_bytes(), bytes);
+            assert_eq!(format!("{got:?}"), format!("{expected:?}"), "in pieces of {bytes} bytes:\n{text}");
+        }
+    }
+    assert!((100..500).contains(&whole), "{whole} of 600 texts have no fault");
+}
