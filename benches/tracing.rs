@@ -10,6 +10,7 @@ use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_grou
 use glam::{Mat3, Vec3};
 use relt::embree::{Hits, Rays, Width};
 use relt::math::{Frame, warp};
+use relt::path::MappingKind;
 use relt::render::calibration::record_rays;
 use relt::rng::{Counter, Purpose, Rng, unit_f32};
 use relt::scene::SceneDescription;
@@ -25,7 +26,7 @@ fn tracing(criterion: &mut Criterion) {
     let plain = support::SCENES.map(|name| (name, support::describe(name)));
     for (name, description) in plain.into_iter().chain([("quadrics", quadrics())]) {
         let scene = support::build(description);
-        let rays = record_rays(&scene, BATCHES);
+        let rays = record_rays(&scene, MappingKind::Unidirectional, BATCHES);
         let mut hits = Hits::default();
         for (kind, batches) in [("camera", &rays.camera), ("bounce", &rays.bounce)] {
             all_widths(criterion, &format!("tracing/packets/{name}/{kind}"), batches, |width, rays| {
