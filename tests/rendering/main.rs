@@ -16,4 +16,3 @@ mod mitsuba;
 mod references;
 mod scattering;
 mod support;
-mod techniques;

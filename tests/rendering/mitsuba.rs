@@ -1,18 +1,96 @@
 //! Small scenes with one feature each against Mitsuba 3: `tests/mitsuba/NAME.xml` and what `compare.py` there made of
 //! it. Materials, lights, shapes, filters, camera and roulette by somebody else's hand.
 
-use relt::render::Method;
+use relt::path::MappingKind;
+use relt::render::{LadderChoice, MappingChoice, Method, Settings};
 
 use crate::support::{Agreement, Expected, load, repository, runs, settings};
 
 fn check(names: &[&str]) {
+    check_with("path", &settings(Method::Path, 1024.0, 0), 0.01, names);
+}
+
+fn check_with(how: &str, settings: &Settings, precision: f64, names: &[&str]) {
     for name in names {
         let folder = repository("tests/mitsuba");
         let scene = load(&folder.join(name).with_extension("xml"), &[]);
         let expected = Expected::read(&folder.join(name).with_extension("exr"));
-        let runs = runs(&scene, &settings(Method::Path, 1024.0, 0), 8);
-        Agreement { name: &format!("mitsuba-{name}"), tiles: [24, 16], precision: 0.01, filter: scene.film.filter }
+        let runs = runs(&scene, settings, 8);
+        Agreement { name: &format!("mitsuba-{name}-{how}"), tiles: [24, 16], precision, filter: scene.film.filter }
             .check(&runs, &expected);
+    }
+}
+
+/// Every kind of light, material, surface, camera and filter.
+const DIVERSE: [&str; 17] = [
+    "brushed-glass",
+    "crop",
+    "everything",
+    "gaussian",
+    "glass",
+    "instances",
+    "mixtures",
+    "orthographic",
+    "picture-lights",
+    "plastics",
+    "principled-varied",
+    "relief",
+    "sky",
+    "smooth",
+    "sphere-light",
+    "spots",
+    "thin-lens",
+];
+
+/// A method with a mapping.
+fn with(method: Method, mapping: MappingKind, mutations_per_pixel: f64) -> Settings {
+    Settings { mapping: MappingChoice::Fixed(mapping), ..settings(method, mutations_per_pixel, 0) }
+}
+
+#[test]
+fn paths_from_both_ends_are_what_mitsuba_makes_of_them() {
+    check_with("bidirectional", &with(Method::Path, MappingKind::Bidirectional, 256.0), 0.02, &DIVERSE);
+}
+
+#[test]
+fn one_technique_a_point_gives_what_mitsuba_makes_of_all() {
+    check_with("multiplexed", &with(Method::Path, MappingKind::Multiplexed, 512.0), 0.02, &DIVERSE);
+}
+
+#[test]
+fn light_tracing_beside_camera_paths_is_what_mitsuba_makes_of_both() {
+    check_with("two-way", &with(Method::Path, MappingKind::TwoWay, 256.0), 0.02, &["everything", "sky", "spots"]);
+}
+
+/// Light tracing alone, where the camera sees no mirror, no smooth glass and no sky.
+#[test]
+fn light_tracing_is_what_mitsuba_makes_of_paths() {
+    let names = [
+        "crop",
+        "cylinder-light",
+        "disk-light",
+        "flipped",
+        "picture-lights",
+        "point",
+        "smooth-emitter-light",
+        "sphere-light",
+        "spots",
+    ];
+    check_with("light", &with(Method::Path, MappingKind::Light, 512.0), 0.02, &names);
+}
+
+/// Chains on paths of both ends, of one point many splats.
+#[test]
+fn chains_on_all_mappings_give_what_mitsuba_makes_of_paths() {
+    for (method, mapping) in [
+        (Method::ReplicaExchange, MappingKind::Bidirectional),
+        (Method::ReplicaExchange, MappingKind::Multiplexed),
+        (Method::Mlt, MappingKind::Bidirectional),
+        (Method::Mlt, MappingKind::Multiplexed),
+    ] {
+        let how = format!("{}-{}", method.name(), mapping.name());
+        let settings = Settings { ladder: LadderChoice::Replicas(3), ..with(method, mapping, 512.0) };
+        check_with(&how, &settings, 0.03, &["everything", "gaussian", "glass"]);
     }
 }
 

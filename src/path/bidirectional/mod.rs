@@ -13,8 +13,6 @@ mod lengths;
 pub mod scalar;
 mod subpath;
 mod techniques;
-#[cfg(test)]
-mod tests;
 mod weights;
 
 pub use lengths::{Chosen, Lengths};

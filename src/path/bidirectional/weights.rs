@@ -118,3 +118,195 @@ impl Step {
 pub fn weight(others: f64) -> f32 {
     (1.0 / (1.0 + others)) as f32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        path::bidirectional::Techniques,
+        rng::{Counter, Purpose, Rng, open_unit_f64},
+    };
+
+    /// A path x₀ … x_n by its densities: those of directions onwards to the lens and back to the light, cosines towards
+    /// both neighbours, squared distances, and which vertices scatter perfectly.
+    struct Path {
+        onwards: Vec<f32>,
+        back: Vec<f32>,
+        cos_onwards: Vec<f32>,
+        cos_back: Vec<f32>,
+        distance2: Vec<f32>,
+        perfect: Vec<bool>,
+        /// Density of x₀ at the start of a light subpath, and by next-event estimation, per area.
+        start: f64,
+        direct: f64,
+        /// Of the last vertex but one, as seen from the lens, per area that faces it.
+        seen: f32,
+        hittable: bool,
+    }
+
+    fn random_path(edges: usize, number: u64) -> Path {
+        let rng = Rng::new(31);
+        let mut block = 0;
+        let mut next = || {
+            let counter = Counter { ladder: edges as u32, replica: 0, step: number, purpose: Purpose::Primary };
+            block += 1;
+            open_unit_f64(rng.words(counter, block)[0])
+        };
+        let n = edges + 1;
+        let mut list = |f: fn(f64) -> f64| -> Vec<f32> { (0..n).map(|_| f(next()) as f32).collect() };
+        let wide = |u: f64| libm::exp(12.0 * (u - 0.5));
+        let [onwards, back, distance2] = [list(wide), list(wide), list(wide)];
+        let [cos_onwards, cos_back] = [list(|u| u), list(|u| u)];
+        let perfect = (0..n).map(|k| (1..edges).contains(&k) && next() < 0.3).collect();
+        let [start, direct, seen] = [wide(next()), wide(next()), wide(next())];
+        let mut path = Path {
+            onwards,
+            back,
+            cos_onwards,
+            cos_back,
+            distance2,
+            perfect,
+            start,
+            direct,
+            seen: seen as f32,
+            hittable: next() < 0.7,
+        };
+        for k in 0..n {
+            if path.perfect[k] {
+                (path.onwards[k], path.back[k]) = (1.0, 1.0);
+            }
+        }
+        path
+    }
+
+    impl Path {
+        fn edges(&self) -> usize {
+            self.onwards.len() - 1
+        }
+
+        /// Density of x_k per area when it comes from x_{k−1}.
+        fn from_light(&self, k: usize) -> f64 {
+            f64::from(self.onwards[k - 1]) * f64::from(self.cos_back[k]) / f64::from(self.distance2[k - 1])
+        }
+
+        /// Density of x_k per area when it comes from x_{k+1}.
+        fn from_camera(&self, k: usize) -> f64 {
+            let cos = f64::from(self.cos_onwards[k]);
+            if k + 1 == self.edges() {
+                return f64::from(self.seen) * cos;
+            }
+            f64::from(self.back[k + 1]) * cos / f64::from(self.distance2[k])
+        }
+
+        /// Whether technique s can make the path, and is to.
+        fn has(&self, techniques: Techniques, s: usize) -> bool {
+            let t = self.edges() + 1 - s;
+            let joined = s == 0 || !self.perfect[s - 1] && !self.perfect[s];
+            techniques.has(s as u16, t as u16) && joined && (s > 0 || self.hittable)
+        }
+
+        /// Its density, by the definition.
+        fn density(&self, s: usize) -> f64 {
+            let light: f64 = match s {
+                0 => 1.0,
+                1 => self.direct,
+                _ => self.start * (1..s).map(|k| self.from_light(k)).product::<f64>(),
+            };
+            light * (s..self.edges()).map(|k| self.from_camera(k)).product::<f64>()
+        }
+
+        /// What the others count beside technique s ≥ 2, by the recursion from the light.
+        fn light_tail(&self, techniques: Techniques, s: usize) -> Tail {
+            let hit = if techniques.hit && self.hittable { 1.0 / (self.start * self.start) } else { 0.0 };
+            let step = Step {
+                density: f64::from(self.onwards[0]),
+                cos: f64::from(self.cos_onwards[0]),
+                before: hit,
+                shorter: square(self.direct / self.start),
+            };
+            let mut tail = step.arrive(self.distance2[0], self.cos_back[1]);
+            for j in 1..s - 1 {
+                let densities = (!self.perfect[j]).then_some([self.onwards[j], self.back[j]]);
+                tail = tail
+                    .leave(densities, self.cos_onwards[j], techniques.has(j as u16, 2))
+                    .arrive(self.distance2[j], self.cos_back[j + 1]);
+            }
+            tail
+        }
+
+        /// The same from the camera, of a subpath with t ≥ 2 vertices.
+        fn camera_tail(&self, techniques: Techniques, t: usize) -> Tail {
+            let n = self.edges();
+            let seen = Step { density: f64::from(self.seen), cos: 0.0, before: 0.0, shorter: 1.0 };
+            let mut tail = seen.arrive(1.0, self.cos_onwards[n - 1]);
+            for j in 1..t - 1 {
+                let k = n - j;
+                let densities = (!self.perfect[k]).then_some([self.back[k], self.onwards[k]]);
+                tail = tail
+                    .leave(densities, self.cos_back[k], techniques.has(2, j as u16))
+                    .arrive(self.distance2[k - 1], self.cos_onwards[k - 1]);
+            }
+            tail
+        }
+
+        /// The weight of technique s.
+        fn weight(&self, techniques: Techniques, s: usize) -> f64 {
+            let n = self.edges();
+            let (t, back_of) = (n + 1 - s, |k: usize| f64::from(self.back[k]));
+            let mut others = 0.0;
+            if s == 1 && techniques.hit && self.hittable {
+                others += square(self.from_camera(0) / self.direct);
+            }
+            if s >= 2 {
+                let j = s - 1;
+                let tail = self.light_tail(techniques, s);
+                others += tail.others(self.from_camera(j), back_of(j), techniques.has(j as u16, 2));
+            }
+            if t >= 2 {
+                let (j, k) = (t - 1, s);
+                let tail = self.camera_tail(techniques, t);
+                let onwards = f64::from(self.onwards[k]);
+                others += match s {
+                    0 => {
+                        tail.others(self.direct, 0.0, techniques.has(1, j as u16))
+                            + tail.others(self.start, onwards, false)
+                    }
+                    _ => {
+                        let start = if s == 1 { square(self.start / self.direct) } else { 1.0 };
+                        start * tail.others(self.from_light(k), onwards, techniques.has(2, j as u16))
+                    }
+                };
+            }
+            1.0 / (1.0 + others)
+        }
+    }
+
+    /// The weights are those of the power heuristic, (p_s)²/Σ (p_i)², by the definition, for all sets of techniques,
+    /// lights that rays hit and such that they do not, and perfect lobes anywhere: so they sum to one.
+    #[test]
+    fn weights_of_the_techniques_of_random_paths_are_those_of_the_power_heuristic() {
+        let mut compared = 0;
+        for techniques in [Techniques::CAMERA, Techniques::LIGHT, Techniques::TWO_WAY, Techniques::ALL] {
+            for edges in 2..9 {
+                for number in 0..200 {
+                    let path = random_path(edges, number);
+                    let possible: Vec<usize> = (0..=edges).filter(|s| path.has(techniques, *s)).collect();
+                    let total: f64 = possible.iter().map(|s| square(path.density(*s))).sum();
+                    let mut sum = 0.0;
+                    for &s in &possible {
+                        let expected = square(path.density(s)) / total;
+                        let got = path.weight(techniques, s);
+                        sum += got;
+                        compared += 1;
+                        assert!(
+                            (got - expected).abs() < 1e-5,
+                            "{techniques:?}, {edges} edges, path {number}, s = {s}: {got} for {expected}"
+                        );
+                    }
+                    assert!(possible.is_empty() || (sum - 1.0).abs() < 1e-5, "{techniques:?}: {sum}");
+                }
+            }
+        }
+        assert!(compared > 5000, "{compared}");
+    }
+}
