@@ -203,11 +203,14 @@ impl RawMesh {
 
 /// The unit normal times the angle at each corner; 0 where there is no normal.
 fn weighted_normals(corners: [Vec3; 3]) -> [Vec3; 3] {
-    let Some(normal) = face_normal(corners) else { return [Vec3::ZERO; 3] };
-    [0, 1, 2].map(|i| {
-        let [to_next, to_last] = [1, 2].map(|j| corners[(i + j) % 3] - corners[i]);
-        normal * libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last))
-    })
+    let mut normals = [Vec3::ZERO; 3];
+    if let Some(normal) = face_normal(corners) {
+        for (i, weighted) in normals.iter_mut().enumerate() {
+            let (to_next, to_last) = (corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]);
+            *weighted = normal * libm::atan2f(to_next.cross(to_last).length(), to_next.dot(to_last));
+        }
+    }
+    normals
 }
 
 /// Unit normal of a triangle, or `None` where single precision cannot tell it: that is what "no area" means here,

@@ -65,23 +65,32 @@ fn parse_in_pieces(source: &mut impl BufRead, bytes: usize) -> Result<RawMesh, S
 fn fill(text: &mut Vec<u8>, source: &mut impl BufRead, bytes: usize) -> io::Result<bool> {
     text.clear();
     source.by_ref().take(bytes as u64).read_to_end(text)?;
-    while source.read_until(b'\n', text)? > 0 && text.trim_ascii_end().ends_with(b"\\") {}
+    let mut line = text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1);
+    while source.read_until(b'\n', text)? > 0 && goes_on(&text[line..]) {
+        line = text.len();
+    }
     Ok(!text.is_empty())
 }
 
 /// Appends the next line, with those that a backslash at its end joins to it; how many these are, 0 at the end.
 fn read_line(source: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
     let mut lines = 0;
+    let mut start = 0;
     while source.read_until(b'\n', line)? > 0 {
         lines += 1;
-        let text = line.trim_ascii_end().len();
-        if !line[..text].ends_with(b"\\") {
+        if !goes_on(&line[start..]) {
             break;
         }
-        line.truncate(text - 1);
+        line.truncate(line.trim_ascii_end().len() - 1);
         line.push(b' ');
+        start = line.len();
     }
     Ok(lines)
+}
+
+/// Whether a backslash at its end joins a line to the next.
+fn goes_on(line: &[u8]) -> bool {
+    line.trim_ascii_end().ends_with(b"\\")
 }
 
 /// A line in a message.

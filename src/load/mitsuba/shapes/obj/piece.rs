@@ -5,7 +5,7 @@ use std::io::BufRead;
 use glam::{Vec2, Vec3};
 
 use super::corners::Corner;
-use super::{Counts, numbers, place, words};
+use super::{Counts, goes_on, numbers, place, words};
 
 /// Some whole lines of a file.
 #[derive(Clone, Debug, Default)]
@@ -48,7 +48,7 @@ impl Piece {
             let start = text.len() - rest.len();
             let length = rest.skip_until(b'\n').expect("memory can be read");
             let line = &text[start..start + length];
-            let goes_on = line.trim_ascii_end().ends_with(b"\\");
+            let goes_on = goes_on(line);
             if goes_on && !is_joined {
                 said.push((start as u32, Said::Unclear));
             } else if !is_joined && let Some(what) = said_by(line, corners) {

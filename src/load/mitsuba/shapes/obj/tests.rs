@@ -174,7 +174,7 @@ fn read_line_by_line(text: &str) -> Result<RawMesh, String> {
 
 #[test]
 fn pieces_of_any_size_give_the_mesh_or_the_first_fault_of_the_whole() {
-    const LINES: [&str; 24] = [
+    const LINES: [&str; 26] = [
         "v 1 2 3",
         "v 0.5 -1e2 7 1",
         "v 4 5 -6",
@@ -184,6 +184,8 @@ fn pieces_of_any_size_give_the_mesh_or_the_first_fault_of_the_whole() {
         "vn 1 0 0 \\\n\\\n",
         "f 1 2 3",
         "f -1 -2 -3",
+        "# \\\\ \n \n",
+        "f 3 2 1 \\",
         "f 1 \\\n-1 2 3",
         "f 1//1 2//1 -1//-1",
         "f 1/1/1 2/1/1 3/1/1 1/1/1",
