@@ -21,11 +21,11 @@ fn check_with(how: &str, settings: &Settings, precision: f64, names: &[&str]) {
     }
 }
 
-/// Every kind of light, material, surface, camera and filter.
-const DIVERSE: [&str; 17] = [
+/// Many kinds of lights, materials, surfaces, cameras and filters. (Not `everything`, where a point light throws caustics
+/// through a glass ball: no camera path finds those, Mitsuba's neither.)
+const DIVERSE: [&str; 16] = [
     "brushed-glass",
     "crop",
-    "everything",
     "gaussian",
     "glass",
     "instances",
@@ -59,10 +59,11 @@ fn one_technique_a_point_gives_what_mitsuba_makes_of_all() {
 
 #[test]
 fn light_tracing_beside_camera_paths_is_what_mitsuba_makes_of_both() {
-    check_with("two-way", &with(Method::Path, MappingKind::TwoWay, 256.0), 0.02, &["everything", "sky", "spots"]);
+    check_with("two-way", &with(Method::Path, MappingKind::TwoWay, 256.0), 0.02, &["mixtures", "sky", "spots"]);
 }
 
-/// Light tracing alone, where the camera sees no mirror, no smooth glass and no sky.
+/// Light tracing alone, where the camera sees no mirror, no smooth glass and no sky. (Nor lamps whose shading normals lean:
+/// what shines behind their geometric normals is found from the camera only.)
 #[test]
 fn light_tracing_is_what_mitsuba_makes_of_paths() {
     let names = [
@@ -72,7 +73,6 @@ fn light_tracing_is_what_mitsuba_makes_of_paths() {
         "flipped",
         "picture-lights",
         "point",
-        "smooth-emitter-light",
         "sphere-light",
         "spots",
     ];
@@ -90,7 +90,7 @@ fn chains_on_all_mappings_give_what_mitsuba_makes_of_paths() {
     ] {
         let how = format!("{}-{}", method.name(), mapping.name());
         let settings = Settings { ladder: LadderChoice::Replicas(3), ..with(method, mapping, 512.0) };
-        check_with(&how, &settings, 0.03, &["everything", "gaussian", "glass"]);
+        check_with(&how, &settings, 0.03, &["gaussian", "glass", "mixtures"]);
     }
 }
 
