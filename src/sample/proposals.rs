@@ -1,7 +1,7 @@
 //! Proposed points, drawn block by block as paths reach them.
 
 use super::{
-    Block, Points, StepLaw,
+    Block, LIGHT_STREAM, Points, StepLaw,
     sobol::{self, LOW_DISCREPANCY_BLOCKS},
     strata::within_pixel,
 };
@@ -68,7 +68,10 @@ impl Proposals<'_> {
             let counters = lanes.map(|lane| self.counters[lane as usize]);
             let words = match lanes.iter().filter(|lane| self.low_discrepancy(block, **lane)).count() {
                 0 => self.rng.words_side_by_side(counters, block),
-                SIDE_BY_SIDE => sobol::words_side_by_side(self.rng, counters, block),
+                SIDE_BY_SIDE => {
+                    let (sequences, number) = self.sequences(counters, block);
+                    sobol::words_side_by_side(self.rng, sequences, number)
+                }
                 _ => {
                     lanes.iter().for_each(|lane| self.draw_one(block, *lane));
                     continue;
@@ -88,7 +91,8 @@ impl Proposals<'_> {
     fn draw_one(&mut self, block: u16, lane: u32) {
         let counter = self.counters[lane as usize];
         let words = if self.low_discrepancy(block, lane) {
-            sobol::words(self.rng, counter, block)
+            let ([sequence], number) = self.sequences([counter], block);
+            sobol::words(self.rng, sequence, number)
         } else {
             self.rng.words(counter, block)
         };
@@ -98,7 +102,20 @@ impl Proposals<'_> {
     /// Whether a block of a lane comes from the low-discrepancy sequence.
     #[inline(always)]
     fn low_discrepancy(&self, block: u16, lane: u32) -> bool {
-        block < LOW_DISCREPANCY_BLOCKS && self.moves[lane as usize] == Move::Stratified
+        block & (LIGHT_STREAM - 1) < LOW_DISCREPANCY_BLOCKS && self.moves[lane as usize] == Move::Stratified
+    }
+
+    /// The sequences that a block of stratified points is drawn from, with the points' numbers there, and the block's number
+    /// among all low-discrepancy ones. Each pixel has a sequence of its own for the camera's subpath; light subpaths have
+    /// nothing to do with pixels and follow one over the whole film.
+    #[inline(always)]
+    fn sequences<const N: usize>(&self, counters: [Counter; N], block: u16) -> ([Counter; N], u16) {
+        if block < LIGHT_STREAM {
+            return (counters, block);
+        }
+        let pixels = u64::from(self.film[0]) * u64::from(self.film[1]);
+        let of_film = |c: Counter| Counter { ladder: 0, step: c.step * pixels + u64::from(c.ladder), ..c };
+        (counters.map(of_film), block - LIGHT_STREAM + LOW_DISCREPANCY_BLOCKS)
     }
 
     /// Makes the lane's block from four words that are uniform.
