@@ -2,7 +2,7 @@
 
 use super::{
     Contribution, Layout,
-    vertex::{self, Carried, Decisions},
+    vertex::{self, Carried, Decisions, Roulette},
 };
 use crate::{
     rng::unit_f32,
@@ -47,7 +47,7 @@ pub fn evaluate<P: Profile>(
         {
             radiance += c.contribution;
         }
-        let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions) else { break };
+        let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) else { break };
         (ray.origin, ray.direction, ray.tfar) = (edge.origin, edge.direction, f32::MAX);
         carried = edge.carried;
     }

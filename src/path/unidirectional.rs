@@ -6,7 +6,7 @@
 use super::{
     Contribution, Contributions, Mapping, Workspace,
     tracing::Kind,
-    vertex::{self, Carried, Decisions},
+    vertex::{self, Carried, Decisions, Roulette},
 };
 use crate::{
     embree::{Hits, MISS, Rays},
@@ -125,7 +125,7 @@ fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &
             w.shadow_rays.push(c.origin, c.direction, c.tfar);
             w.shadow_contributions.push(c.contribution);
         }
-        if let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions) {
+        if let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) {
             w.lanes[kept] = lane;
             w.carried[kept] = edge.carried;
             w.rays.set(kept, edge.origin, edge.direction, f32::MAX);

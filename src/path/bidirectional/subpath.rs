@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     math::{Frame, offset_origin},
-    path::vertex::{self, Carried, Decisions, Edge},
+    path::vertex::{self, Carried, Decisions, Edge, MOST_SURVIVAL, Roulette},
     scene::{
         Mixture, Profile, Rgb, ScatteringRef, Scene, Surface,
         lights::{Emission, EmitterKind},
@@ -83,7 +83,7 @@ impl LightVertex {
         wo: Vec3::Z,
         appearance: 0,
         mixture: PLAIN,
-        arrival: Arrival { flux: Rgb::ZERO, left: Rgb::ZERO, tail: STRAIGHT_OUT },
+        arrival: Arrival { flux: Rgb::ZERO, tail: STRAIGHT_OUT },
     };
 
     /// The place, with its scattering function from wherever it is.
@@ -104,8 +104,6 @@ impl LightVertex {
 pub(super) struct Particle {
     /// Emitted power over all densities so far, times all reflectances.
     pub flux: Rgb,
-    /// The part of the emitted power that is left, by which roulette is played.
-    pub left: Rgb,
 }
 
 /// A light subpath at its last vertex.
@@ -114,7 +112,6 @@ pub(super) struct Arrival {
     /// Its flux over |cos| of the last edge by the geometric normal: f |cos| by the shading normal times this is what
     /// leaves.
     pub flux: Rgb,
-    pub left: Rgb,
     pub tail: Tail,
 }
 
@@ -124,12 +121,12 @@ const LEAST_COSINE: f32 = 1e-9;
 impl Particle {
     #[inline(always)]
     fn arrive(&self, cos: f32, tail: Tail) -> Arrival {
-        Arrival { flux: self.flux / cos.max(LEAST_COSINE), left: self.left, tail }
+        Arrival { flux: self.flux / cos.max(LEAST_COSINE), tail }
     }
 
     /// At the start, `flux` being that of the emission.
     pub fn new(flux: Rgb) -> Particle {
-        Particle { flux, left: Rgb::ONE }
+        Particle { flux }
     }
 
     /// Arrives at the first vertex after the light.
@@ -198,7 +195,10 @@ pub(super) struct LightEdge {
     pub step: Step,
 }
 
-/// Scattering of a light subpath at its vertex number `j`, counted from the one on the light, and roulette.
+/// Scattering of a light subpath at its vertex number `j`, counted from the one on the light, and roulette by the part of
+/// the power that this vertex scatters. (By what is left of all power, as camera subpaths play it, `lattice` has 1.6 times
+/// the error at equal time by light tracing and 1.3 times by all techniques: what has got through many bounces is what
+/// counts there. `cornell-box` has 0.95 and 1.02 times.)
 ///
 /// Light goes from `wo` to the sampled direction, against the arguments of scattering functions: what counts is f(wi, wo).
 /// For perfect refraction that is f(wo, wi) times the square of the ratio of indices. Shading normals do not conserve
@@ -221,17 +221,15 @@ pub(super) fn scatter_light<P: Profile>(
         let there = site.scattering.evaluate::<P>(sample.wi, site.wo);
         (there.value / sample.pdf, Some([sample.pdf, there.pdf]))
     };
-    let flux = arrival.flux * weight * cos;
-    // what is left of the power by what arrived: both fluxes, but for the cosine that one of them was divided by
-    let cos_before = site.cos(site.frame.to_world(site.wo)).max(LEAST_COSINE);
-    let mut particle = Particle { flux, left: arrival.left * weight * (cos / cos_before) };
+    let mut particle = Particle { flux: arrival.flux * weight * cos };
     if let Some(u) = decisions.roulette {
-        let survival = particle.left.max_element().min(0.95);
+        // the part of what arrived that leaves: both fluxes, but for the cosine that one of them was divided by
+        let cos_before = site.cos(site.frame.to_world(site.wo)).max(LEAST_COSINE);
+        let survival = (weight.max_element() * cos / cos_before).min(MOST_SURVIVAL);
         if u >= survival {
             return None;
         }
         particle.flux /= survival;
-        particle.left /= survival;
     }
     if particle.flux == Rgb::ZERO {
         return None;
@@ -267,7 +265,7 @@ pub(super) fn scatter_camera<P: Profile>(
     techniques: Techniques,
     j: u16,
 ) -> Option<(Edge, Step)> {
-    let edge = vertex::scatter::<P>(surface, &end.carried, decisions)?;
+    let edge = vertex::scatter::<P>(surface, &end.carried, decisions, Roulette::Path)?;
     let site = Site::of(surface);
     let pdf = edge.carried.pdf;
     let densities = if !P::DIFFUSE && pdf == f32::INFINITY {
