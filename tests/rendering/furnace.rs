@@ -1,6 +1,7 @@
 //! Furnaces: scenes whose image is the same everywhere and known by a formula.
 
-use relt::render::{LadderChoice, Method, Settings};
+use relt::path::MappingKind;
+use relt::render::{LadderChoice, MappingChoice, Method, Settings};
 
 use crate::support::{Agreement, Expected, runs, scene_of, settings};
 
@@ -33,13 +34,34 @@ fn methods() -> Vec<(&'static str, Settings)> {
     vec![("path", of(Method::Path)), ("mlt", of(Method::Mlt)), ("re", of(Method::ReplicaExchange)), ("re-2", ladder(2))]
 }
 
+/// All mappings with several ways to make a path, by path tracing, and the two with most by chains.
+fn mappings() -> Vec<(&'static str, Settings)> {
+    let of = |method, mapping| Settings {
+        mapping: MappingChoice::Fixed(mapping),
+        ladder: LadderChoice::Replicas(3),
+        ..settings(method, 256.0, 0)
+    };
+    use {MappingKind::*, Method::*};
+    vec![
+        ("two-way", of(Path, TwoWay)),
+        ("bidirectional", of(Path, Bidirectional)),
+        ("multiplexed", of(Path, Multiplexed)),
+        ("re-bidirectional", of(ReplicaExchange, Bidirectional)),
+        ("mlt-multiplexed", of(Mlt, Multiplexed)),
+    ]
+}
+
 fn check(name: &str, scene: &str, radiance: f64, precision: f64) {
+    check_with(&methods(), name, scene, radiance, precision);
+}
+
+fn check_with(methods: &[(&str, Settings)], name: &str, scene: &str, radiance: f64, precision: f64) {
     let scene = scene_of(scene);
     let expected = Expected::constant(24, 16, [radiance as f32; 3]);
-    for (method, settings) in methods() {
+    for (method, settings) in methods {
         let name = format!("furnace-{name}-{method}");
         Agreement { name: &name, tiles: [24, 16], precision, filter: scene.film.filter }
-            .check(&runs(&scene, &settings, 8), &expected);
+            .check(&runs(&scene, settings, 8), &expected);
     }
 }
 
@@ -51,6 +73,23 @@ fn closed_rooms_that_glow_are_as_bright_as_their_series() {
             let radiance = 1.0 / (1.0 - albedo);
             check(&format!("{shape}-{albedo}"), &closed(shape, albedo, -1, 5), radiance, 0.005);
         }
+    }
+}
+
+/// Whatever the techniques, their weights make a whole of them: walls that glow, roulette from the start, a wide lens;
+/// glass and mirrors in a sky.
+#[test]
+fn closed_rooms_and_clear_bodies_are_as_bright_by_all_mappings() {
+    check_with(&mappings(), "cube", &closed("cube", 0.5, -1, 2), 2.0, 0.01);
+    check_with(&mappings(), "sphere", &closed("sphere", 0.5, 5, 5), 1.9375, 0.01);
+    let lens = "type='thinlens'><float name='aperture_radius' value='0.3'/><float name='focus_distance' value='1'/>";
+    let scene = closed("cube", 0.5, 4, 5).replace("type='perspective'>", lens);
+    check_with(&mappings()[1..3], "lens", &scene, 1.875, 0.01);
+    let sky = "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>";
+    for (name, bsdf) in [("glass", "<bsdf type='dielectric'/>"), ("mirror", "<bsdf type='conductor'/>")] {
+        let ball = format!("<shape type='sphere'><float name='radius' value='0.9'/>{bsdf}</shape>");
+        let scene = format!("{}{ball}{sky}", view("0, 0, 2.5", "0, 0, 0", 8, 9));
+        check_with(&mappings()[..3], name, &scene, 1.0, 0.02);
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use relt::render::{Combine, LadderChoice, Method, MltSettings, Normalisation, Settings};
+use relt::path::MappingKind;
+use relt::render::{Combine, LadderChoice, MappingChoice, Method, MltSettings, Normalisation, Settings};
 use relt::scene::Scene;
 
 use crate::support::{Agreement, Expected, load, repository, runs, settings};
@@ -56,6 +57,28 @@ fn own(name: &str, precision: f64) {
     check(name, &load(&folder.join("scene.xml"), &[("res", "64")]), &folder, precision);
 }
 
+/// Path tracing with paths from both ends, and chains on them and on one technique a point.
+fn methods_on_mappings() -> Vec<(&'static str, Settings)> {
+    let of = |method, mapping, mutations| Settings {
+        mapping: MappingChoice::Fixed(mapping),
+        ..settings(method, mutations, 0)
+    };
+    vec![
+        ("path-bidirectional", of(Method::Path, MappingKind::Bidirectional, 40.0)),
+        ("re-bidirectional", of(Method::ReplicaExchange, MappingKind::Bidirectional, 40.0)),
+        ("re-multiplexed", of(Method::ReplicaExchange, MappingKind::Multiplexed, MUTATIONS)),
+    ]
+}
+
+#[test]
+fn our_scenes_agree_with_their_references_by_all_mappings() {
+    for name in ["cornell-box", "caustic", "lattice"] {
+        let folder = repository("scenes").join(name);
+        let scene = load(&folder.join("scene.xml"), &[("res", "64")]);
+        check_methods(&methods_on_mappings(), name, &scene, &folder, [16, 16], 0.03);
+    }
+}
+
 #[test]
 fn the_cornell_box_agrees_with_its_reference() {
     own("cornell-box", 0.005);
@@ -106,6 +129,7 @@ fn two_methods() -> [(&'static str, Settings); 2] {
 fn veachs_plates_agree_with_their_reference() {
     if let Some((scene, folder)) = scene_of_others("veach-mis", [96, 54]) {
         check_methods(&two_methods(), "veach-mis", &scene, &folder, [16, 9], 0.02);
+        check_methods(&methods_on_mappings()[..1], "veach-mis", &scene, &folder, [16, 9], 0.02);
     }
 }
 
