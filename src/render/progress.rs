@@ -112,6 +112,7 @@ impl Observer for Progress {
             bar.set_message("starting");
         }
         self.say(&heading(start));
+        start.mapping_trial.iter().for_each(|why| self.say(why));
     }
 
     fn progress(&self, status: &Status) {
@@ -156,7 +157,7 @@ impl Observer for Progress {
     }
 }
 
-/// `scenes/door/scene.xml: 256 × 256, replica exchange with 4 replicas, 64 mutations per pixel, 2 threads`
+/// `scenes/door/scene.xml: 256 × 256, replica exchange with 4 replicas, light mapping, 64 mutations per pixel, 2 threads`
 pub fn heading(start: &RunStart) -> String {
     let settings = &start.settings;
     let mut words = vec![format!("{}: {} × {}", start.scene, start.width, start.height)];
@@ -172,6 +173,7 @@ pub fn heading(start: &RunStart) -> String {
             });
         }
     }
+    words.push(format!("{} mapping", start.mapping.name()));
     let mpp = settings.mutations_per_pixel.map(|mpp| format!("{mpp} mutations per pixel"));
     let time = settings.time.map(|time| humantime::format_duration(time).to_string());
     match (mpp, time) {
