@@ -112,7 +112,13 @@ fn the_film_and_embree_are_described() {
     assert_says(
         "cornell-box",
         &[],
-        &["256 × 256 pixels, box filter", "4.0 MiB for path and mlt, 12.0 MiB for re", "light subpaths: 4.0 MiB for mlt, 8.0 MiB for path, 20.0 MiB for re", "Embree 4.", "ROBUST"],
+        &[
+            "256 × 256 pixels, box filter",
+            "4.0 MiB for path and mlt, 12.0 MiB for re",
+            "light subpaths: 4.0 MiB for mlt, 8.0 MiB for path, 20.0 MiB for re",
+            "Embree 4.",
+            "ROBUST",
+        ],
     );
 }
 

@@ -158,7 +158,14 @@ fn what_belongs_to_something_else_is_refused() {
     refused(
         folder.path(),
         &others,
-        &["r.state is of another reference", "--mapping unidirectional, not two-way", "--mpp 4, not 8", "--seed 0, not 5", "--method path, not re", "delete it"],
+        &[
+            "r.state is of another reference",
+            "--mapping unidirectional, not two-way",
+            "--mpp 4, not 8",
+            "--seed 0, not 5",
+            "--method path, not re",
+            "delete it",
+        ],
     );
     refused(folder.path(), &[&options[..], &["-D", "max_depth=2"]].concat(), &["scene ", "max_depth=2"]);
     std::fs::write(folder.path().join("r.state"), "hello").unwrap();
@@ -177,6 +184,20 @@ fn what_belongs_to_something_else_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("a reference is .exr"));
     assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_reference_by_light_tracing_is_refused_where_it_would_lack_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let caustic = CORNELL_BOX.replace("cornell-box", "caustic");
+    let output = Command::new(env!("CARGO_BIN_EXE_relt"))
+        .args(["reference", &caustic, "--target-relmse", "1", "--mapping", "light", "-o", "r.exr"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("--mapping light: a reference of this scene would lack whatever is seen in"), "{text}");
 }
 
 #[test]

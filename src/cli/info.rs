@@ -173,7 +173,8 @@ fn mappings(features: &Features) -> Vec<String> {
         MappingKind::ALL.into_iter().partition(|kind| kind.misses(features).is_empty());
     let mut lines = vec![format!("{}; auto tries {}", names(&whole), names(&trial::candidates(features)))];
     lines.extend(
-        part.iter().map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),
+        part.iter()
+            .map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),
     );
     let depth = Layout::new(features, false).max_depth();
     let lit = (features.area_lights + features.infinite_lights > 0, "no light has an extent");
@@ -186,7 +187,8 @@ fn mappings(features: &Features) -> Vec<String> {
         ("light subpaths joined to camera subpaths", vec![smooth, longer(3)]),
     ];
     let reason = |needs: &[(bool, &'static str)]| needs.iter().find(|(met, _)| !met).map(|(_, reason)| *reason);
-    let used: Vec<&str> = techniques.iter().filter(|(_, needs)| reason(needs).is_none()).map(|(name, _)| *name).collect();
+    let used: Vec<&str> =
+        techniques.iter().filter(|(_, needs)| reason(needs).is_none()).map(|(name, _)| *name).collect();
     if !used.is_empty() {
         lines.push(format!("techniques: {}", used.join(", ")));
     }

@@ -12,8 +12,8 @@ use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::film::file::{check_writable, write_whole};
 use crate::film::{Image, PixelFormat, Plane, Value, exr_file};
-use crate::render::progress::significant;
 use crate::path::MappingKind;
+use crate::render::progress::significant;
 use crate::render::{self, Job, MappingChoice, Method, Observer, PacketChoice, RenderError, Settings, Status};
 use crate::scene::{Features, SceneDescription};
 use crate::study::metrics::VARIANCE;
@@ -154,7 +154,9 @@ impl Reference {
             return Ok(());
         }
         let (name, missed) = (self.mapping.name(), missed.join(" and "));
-        Err(Failure::input(format_args!("--mapping {name}: a reference of this scene would lack {missed}; all others serve")))
+        Err(Failure::input(format_args!(
+            "--mapping {name}: a reference of this scene would lack {missed}; all others serve"
+        )))
     }
 
     fn recipe(&self, description: &SceneDescription) -> Recipe {

@@ -453,7 +453,13 @@ mod tests {
         let message = |recipe: &Recipe| read_state(&file, recipe).unwrap_err().to_string();
         let [method, mapping] = ["mlt", "light"].map(str::to_owned);
         let text = message(&Recipe { method, mapping, mutations_per_pixel: 0.5, seed: 3, ..recipe() });
-        for part in ["--method path, not mlt", "--mapping two-way, not light", "--mpp 128, not 0.5", "not 3", "delete it to begin anew"] {
+        for part in [
+            "--method path, not mlt",
+            "--mapping two-way, not light",
+            "--mpp 128, not 0.5",
+            "not 3",
+            "delete it to begin anew",
+        ] {
             assert!(text.contains(part), "{part:?} is not in: {text}");
         }
         assert!(message(&Recipe { width: 16, ..recipe() }).contains("size 32 × 32, not 16 × 32"));
