@@ -11,6 +11,10 @@
 //!
 //! `mutations/packets/SCENE` has `mlt/W` and `re/W`, the latter with four rungs, with all rays in packets of W.
 //!
+//! `mutations/mappings/SCENE` has, for each mapping M, `path/M`, the path tracer by it, and `embree/M`, which traces the rays
+//! of that mapping's uniform points and is told in paths a second as well: `path/M` divided by `embree/M` is the share of
+//! its time in Embree. Each mapping has the packet widths that calibration chose for its own rays.
+//!
 //! Chains prefer some points to others, so their paths are longer or shorter: the numbers of rays that are printed
 //! allow for that.
 
@@ -54,6 +58,7 @@ fn mutations(criterion: &mut Criterion) {
         let mut runs = runs();
         ladders(criterion, &subject, &mut runs);
         packets(criterion, &subject, &mut runs);
+        mappings(criterion, &subject);
     }
 }
 
@@ -66,14 +71,14 @@ fn group<'c>(criterion: &'c mut Criterion, name: &str) -> BenchmarkGroup<'c, Wal
 
 fn ladders(criterion: &mut Criterion, subject: &Subject, runs: &mut [Run]) {
     let mut group = group(criterion, &format!("mutations/ladders/{}", subject.name));
-    bare_embree(&mut group, subject);
+    bare_embree(&mut group, BenchmarkId::from_parameter("embree"), subject, MappingKind::Unidirectional);
     group.throughput(Throughput::Elements(SLICE));
     for run in runs {
         let id = match run.rungs {
             Some(rungs) => BenchmarkId::new(run.name, rungs),
             None => BenchmarkId::from_parameter(run.name),
         };
-        group.bench_function(id, |bencher| run.measure(bencher, subject.scene(), subject.widths()));
+        group.bench_function(id, |bencher| run.measure(bencher, subject.scene(), subject.widths(run.mapping)));
     }
 }
 
@@ -91,10 +96,24 @@ fn packets(criterion: &mut Criterion, subject: &Subject, runs: &mut [Run]) {
     }
 }
 
+fn mappings(criterion: &mut Criterion, subject: &Subject) {
+    let mut group = group(criterion, &format!("mutations/mappings/{}", subject.name));
+    for mapping in MappingKind::ALL {
+        bare_embree(&mut group, BenchmarkId::new("embree", mapping.name()), subject, mapping);
+        let settings = Settings { method: Method::Path, ..Settings::default() };
+        let mut run = Run { name: "path", rungs: None, mapping, settings, engine: None };
+        group.throughput(Throughput::Elements(SLICE));
+        group.bench_function(BenchmarkId::new("path", mapping.name()), |bencher| {
+            run.measure(bencher, subject.scene(), subject.widths(mapping));
+        });
+    }
+}
+
 /// A method, set up and past its beginnings as soon as it is first measured.
 struct Run {
     name: &'static str,
     rungs: Option<u32>,
+    mapping: MappingKind,
     settings: Settings,
     engine: Option<Box<dyn Engine>>,
 }
@@ -103,7 +122,7 @@ fn runs() -> Vec<Run> {
     let run = |name, method, change: &dyn Fn(&mut Settings)| {
         let mut settings = Settings { method, ..Settings::default() };
         change(&mut settings);
-        Run { name, rungs: None, settings, engine: None }
+        Run { name, rungs: None, mapping: MappingKind::Unidirectional, settings, engine: None }
     };
     let best = MltSettings { large_steps: 0.1, normalisation: Normalisation::Pooled, kelemen_weights: true };
     let mut all = vec![
@@ -125,7 +144,7 @@ fn runs() -> Vec<Run> {
 impl Run {
     fn measure(&mut self, bencher: &mut Bencher, scene: &Scene, widths: Widths) {
         let stage = Stage {
-            mapping: Mapping::new(scene, MappingKind::Unidirectional, widths),
+            mapping: Mapping::new(scene, self.mapping, widths),
             footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
             rng: Rng::new(self.settings.seed),
         };
@@ -183,14 +202,15 @@ fn is_smoke_test() -> bool {
     std::env::args().any(|argument| argument == "--test")
 }
 
-fn bare_embree(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
+/// Traces the rays of uniform points of that mapping and does nothing else.
+fn bare_embree(group: &mut BenchmarkGroup<WallTime>, id: BenchmarkId, subject: &Subject, mapping: MappingKind) {
     let recorded = OnceCell::new();
     let (mut hits, mut occluded) = (Hits::default(), Vec::new());
     group.throughput(Throughput::Elements(BATCHES * LANES));
-    group.bench_function("embree", |bencher| {
-        let (tracer, widths) = (&subject.scene().tracer, subject.widths());
+    group.bench_function(id, |bencher| {
+        let (tracer, widths) = (&subject.scene().tracer, subject.widths(mapping));
         let rays = recorded.get_or_init(|| {
-            let rays = record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES);
+            let rays = record_rays(subject.scene(), mapping, BATCHES);
             let total: usize = [&rays.camera, &rays.bounce, &rays.shadow].into_iter().flatten().map(Rays::len).sum();
             println!("{:.2} rays a path", total as f64 / (BATCHES * LANES) as f64);
             rays

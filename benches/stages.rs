@@ -64,7 +64,10 @@ fn evaluator<W: Default>(workspace: W) -> Evaluator<W> {
 /// The batch after its first evaluation.
 fn evaluated(subject: &Subject) -> Evaluator<Workspace> {
     let mut paths = evaluator(Workspace::default());
-    paths.evaluate(&Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths()), &Points::new(0));
+    paths.evaluate(
+        &Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths(MappingKind::Unidirectional)),
+        &Points::new(0),
+    );
     paths
 }
 
@@ -122,7 +125,8 @@ fn evaluate(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let mut paths = evaluator(Workspace::default());
     let mut step = 0;
     group.bench_function("evaluate", |bencher| {
-        let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
+        let mapping =
+            Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths(MappingKind::Unidirectional));
         bencher.iter(|| {
             step += 1;
             set_step(&mut paths, step);
@@ -135,7 +139,7 @@ fn trace(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let recorded = OnceCell::new();
     let (mut hits, mut occluded) = (Hits::default(), Vec::new());
     group.bench_function("trace", |bencher| {
-        let (tracer, widths) = (&subject.scene().tracer, subject.widths());
+        let (tracer, widths) = (&subject.scene().tracer, subject.widths(MappingKind::Unidirectional));
         let rays = recorded.get_or_init(|| record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES));
         bencher.iter(|| {
             rays.camera.iter().for_each(|rays| tracer.closest(widths.camera, rays, &mut hits));
@@ -149,7 +153,8 @@ fn trace(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
 fn shade(group: &mut BenchmarkGroup<WallTime>, subject: &Subject) {
     let mut replayed = None;
     group.bench_function("shade", |bencher| {
-        let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
+        let mapping =
+            Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths(MappingKind::Unidirectional));
         let paths = replayed.get_or_insert_with(|| {
             evaluator(Workspace::replaying(record_rays(subject.scene(), MappingKind::Unidirectional, BATCHES)))
         });
@@ -198,7 +203,8 @@ fn make(chains: &mut Walkers, step: &Step) -> [f64; 2] {
 
 /// Chains on the luminance some time after their start, and their next steps.
 fn record_steps(subject: &Subject) -> (Walkers, Vec<Step>) {
-    let mapping = Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths());
+    let mapping =
+        Mapping::new(subject.scene(), MappingKind::Unidirectional, subject.widths(MappingKind::Unidirectional));
     let mut paths = evaluator(Workspace::default());
     let mut samples = Vec::new();
     for number in 0..STARTS {

@@ -108,7 +108,7 @@ enum Unit {
     Nanoseconds,
 }
 
-const TABLES: [Table; 6] = [
+const TABLES: [Table; 7] = [
     Table {
         title: "Million mutations a second on one thread (and by those of `mlt`)",
         prefix: "mutations/ladders/",
@@ -122,6 +122,13 @@ const TABLES: [Table; 6] = [
         has: |_| true,
         unit: Unit::Millions,
         baseline: single_rays,
+    },
+    Table {
+        title: "Million paths a second by mapping, of path tracing and of Embree alone (and of path tracing by the latter)",
+        prefix: "mutations/mappings/",
+        has: |_| true,
+        unit: Unit::Millions,
+        baseline: |row| row.strip_prefix("path/").map(|mapping| format!("embree/{mapping}")),
     },
     Table {
         title: "Nanoseconds that stages take for each mutation (`shade` has `propose/fresh` in it, `evaluate` is both and `trace`)",

@@ -65,6 +65,40 @@ fn a_run_leaves_image_preview_and_log() {
     }
 }
 
+/// 64 × 64 pixels at 32 mutations each leave a trial just the points that it needs.
+#[test]
+fn the_mapping_is_told_with_why_it_was_chosen() {
+    let told = |options: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let files = ["-o", "a.exr", "--log", "run.jsonl"];
+        let scene = CORNELL_BOX.replace("cornell-box", "lattice");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_relt"));
+        command.args(["render", &scene, "--method", "path"]).args(options).args(files).current_dir(folder.path());
+        let output = command.output().unwrap();
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{text}");
+        let read = exr_file::read_file(&folder.path().join("a.exr")).unwrap();
+        let start = log_lines(&folder.path().join("run.jsonl"))[0].clone();
+        let name = start["mapping"].as_str().unwrap().to_owned();
+        assert!(read.metadata.contains(&("mapping".into(), Value::from(name.as_str()))), "{:?}", read.metadata);
+        assert!(text.contains(&format!(", {name} mapping, ")), "{text}");
+        (name, start["mapping_trial"].as_str().map(str::to_owned), text, read.image)
+    };
+    let with_trial = |threads| told(&["-D", "res=64", "--mpp", "32", "--threads", threads]);
+    let (name, why, text, image) = with_trial("1");
+    assert_ne!(name, "unidirectional", "{text}");
+    let why = why.expect("a trial");
+    assert!(why.starts_with(&name) && why.contains("bidirectional 0.") && text.contains(&why), "{text}");
+    let two = with_trial("2");
+    assert_eq!((two.0, two.1, two.3 == image), (name, Some(why), true));
+
+    let (name, why, text, _) = told(&["-D", "res=16", "--mpp", "1"]);
+    assert_eq!(name, "unidirectional");
+    assert!(why.is_some_and(|why| why.contains("no room for a trial") && text.contains(&why)), "{text}");
+    let (name, why, text, _) = told(&["-D", "res=16", "--mpp", "1", "--mapping", "multiplexed"]);
+    assert_eq!((name.as_str(), why), ("multiplexed", None), "{text}");
+}
+
 #[test]
 fn quiet_runs_say_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -59,6 +59,47 @@ fn glass_takes_the_plain_kernel_and_a_choice_of_lobe() {
 }
 
 #[test]
+fn light_subpaths_have_dimensions_of_their_own() {
+    assert_says(
+        "cornell-box",
+        &[],
+        &[
+            "start of a light subpath, for all mappings but unidirectional: 4 (place on light 2, direction 2), drawn in one \
+             block of four its bounces 1 to 4: 2 (direction 2), drawn in one block of four its bounces 5 to 14: 3 \
+             (direction 2, roulette 1), drawn in one block of four",
+            "multiplexed: 6 (place on light 2, direction 2, length 1, technique 1), drawn in two blocks of four; no roulette",
+        ],
+    );
+    assert_says("caustic", &[], &["its bounces 1 to 4: 3 (direction 2, lobe 1), drawn in one block of four"]);
+}
+
+#[test]
+fn mappings_that_serve_are_told_from_those_that_do_not() {
+    assert_says(
+        "lattice",
+        &[],
+        &[
+            "mappings unidirectional, light, two-way, bidirectional, multiplexed; auto tries unidirectional, light, two-way, \
+             bidirectional techniques: camera subpaths that hit lights, next-event estimation, light subpaths connected to \
+             the camera, light subpaths joined to camera subpaths dimensions",
+        ],
+    );
+    assert_says(
+        "water",
+        &[],
+        &[
+            "mappings unidirectional, two-way, bidirectional, multiplexed; auto tries unidirectional, two-way, bidirectional \
+             left out: light, which lacks whatever is seen in perfect mirrors, through smooth glass or through masks",
+        ],
+    );
+    assert_says(
+        "cornell-box",
+        &["-D", "max_depth=2"],
+        &["left out: light subpaths joined to camera subpaths, for paths are too short"],
+    );
+}
+
+#[test]
 fn limits_on_path_length_are_told() {
     assert_says("cornell-box", &["-D", "max_depth=1"], &["1 edge", "no Russian roulette", "left out: lens"]);
     assert_says("cornell-box", &["-D", "max_depth=3"], &["up to 3 edges, no Russian roulette", "bounces 1 to 2: 4"]);
@@ -67,11 +108,17 @@ fn limits_on_path_length_are_told() {
 
 #[test]
 fn the_film_and_embree_are_described() {
-    // 256² pixels of 64 bytes a layer: one layer, or three
+    // 256² pixels of 64 bytes a layer: one layer, or three; two and five where points splat elsewhere
     assert_says(
         "cornell-box",
         &[],
-        &["256 × 256 pixels, box filter", "4.0 MiB for path and mlt, 12.0 MiB for re", "Embree 4.", "ROBUST"],
+        &[
+            "256 × 256 pixels, box filter",
+            "4.0 MiB for path and mlt, 12.0 MiB for re",
+            "light subpaths: 4.0 MiB for mlt, 8.0 MiB for path, 20.0 MiB for re",
+            "Embree 4.",
+            "ROBUST",
+        ],
     );
 }
 

@@ -73,7 +73,7 @@ fn it_leaves_an_image_with_variance_a_text_and_a_state() {
     let words = std::fs::read_to_string(folder.path().join("r.txt")).unwrap();
     for part in [
         concat!("relt ", env!("CARGO_PKG_VERSION"), ", Embree 4."),
-        "path, 8 passes of 4 mutations per pixel, 32 mutations per pixel in all, seed 0\n",
+        "path, unidirectional mapping, 8 passes of 4 mutations per pixel, 32 mutations per pixel in all, seed 0\n",
         "16 × 16 pixels",
         "mean [0.",
         "estimated own RMSE ",
@@ -154,11 +154,18 @@ fn what_belongs_to_something_else_is_refused() {
             assert!(text.contains(part), "{options:?}: {part:?} is not in:\n{text}");
         }
     };
-    let others = ["--target-relmse", "1", "--mpp", "8", "--seed", "5", "--method", "re"];
+    let others = ["--target-relmse", "1", "--mpp", "8", "--seed", "5", "--method", "re", "--mapping", "two-way"];
     refused(
         folder.path(),
         &others,
-        &["r.state is of another reference", "--mpp 4, not 8", "--seed 0, not 5", "--method path, not re", "delete it"],
+        &[
+            "r.state is of another reference",
+            "--mapping unidirectional, not two-way",
+            "--mpp 4, not 8",
+            "--seed 0, not 5",
+            "--method path, not re",
+            "delete it",
+        ],
     );
     refused(folder.path(), &[&options[..], &["-D", "max_depth=2"]].concat(), &["scene ", "max_depth=2"]);
     std::fs::write(folder.path().join("r.state"), "hello").unwrap();
@@ -177,6 +184,20 @@ fn what_belongs_to_something_else_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("a reference is .exr"));
     assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_reference_by_light_tracing_is_refused_where_it_would_lack_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let caustic = CORNELL_BOX.replace("cornell-box", "caustic");
+    let output = Command::new(env!("CARGO_BIN_EXE_relt"))
+        .args(["reference", &caustic, "--target-relmse", "1", "--mapping", "light", "-o", "r.exr"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("--mapping light: a reference of this scene would lack whatever is seen in"), "{text}");
 }
 
 #[test]

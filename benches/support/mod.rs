@@ -18,23 +18,23 @@ pub const SCENES: [&str; 3] = ["cornell-box", "caustic", "lattice"];
 pub struct Subject {
     pub name: &'static str,
     scene: OnceCell<Scene>,
-    widths: OnceCell<Widths>,
+    widths: [OnceCell<Widths>; MappingKind::ALL.len()],
 }
 
 impl Subject {
     pub fn new(name: &'static str) -> Subject {
-        Subject { name, scene: OnceCell::new(), widths: OnceCell::new() }
+        Subject { name, scene: OnceCell::new(), widths: Default::default() }
     }
 
     pub fn scene(&self) -> &Scene {
         self.scene.get_or_init(|| build(describe(self.name)))
     }
 
-    /// The packet widths that calibration finds fastest.
-    pub fn widths(&self) -> Widths {
-        *self.widths.get_or_init(|| {
-            let widths = calibrate(self.scene(), MappingKind::Unidirectional);
-            println!("{}: {widths:?}", self.name);
+    /// The packet widths that calibration finds fastest for that mapping.
+    pub fn widths(&self, mapping: MappingKind) -> Widths {
+        *self.widths[mapping as usize].get_or_init(|| {
+            let widths = calibrate(self.scene(), mapping);
+            println!("{}, {}: {widths:?}", self.name, mapping.name());
             widths
         })
     }

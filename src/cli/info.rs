@@ -9,7 +9,8 @@ use super::failure::Failure;
 use super::scene::{Opened, SceneArguments};
 use crate::embree::{Device, Scene as Tracer};
 use crate::film::{Accumulator, Filter, PixelFormat};
-use crate::path::Layout;
+use crate::path::{Layout, MappingKind};
+use crate::render::trial;
 use crate::scene::description::FilmDescription;
 use crate::scene::{Appearance, Features, Kernel, Scene, materials};
 use crate::tempering::{Choices, Layers};
@@ -42,6 +43,7 @@ fn report(opened: &Opened) -> String {
         ("shapes", shapes(&scene.features)),
         ("materials", materials(scene)),
         ("lights", lights(&scene.features)),
+        ("mappings", mappings(&scene.features)),
         ("dimensions", dimensions(&scene.features)),
         ("kernel", kernel(&scene.features)),
         ("embree", embree(device, &scene.features)),
@@ -84,12 +86,17 @@ fn film(film: &FilmDescription) -> Vec<String> {
         let bytes = film.width as usize * film.height as usize * Accumulator::BYTES_PER_PIXEL * layers;
         bytes as f64 / f64::from(1 << 20)
     };
+    // of --method path, which is a ladder of one rung, and re
+    let [[path, re], [path_elsewhere, re_elsewhere]] =
+        [false, true].map(|elsewhere| [1, 2].map(|rungs| Layers::of(&Choices::default(), rungs, elsewhere).count));
     vec![
         format!("{} × {} pixels{part}, {filter}{negative}{format}", film.width, film.height),
+        format!("memory: {:.1} MiB for path and mlt, {:.1} MiB for re", mebibytes(path), mebibytes(re)),
         format!(
-            "memory: {:.1} MiB for path and mlt, {:.1} MiB for re",
+            "memory with light subpaths: {:.1} MiB for mlt, {:.1} MiB for path, {:.1} MiB for re",
             mebibytes(1),
-            mebibytes(Layers::of(&Choices::default(), 2, false).count)
+            mebibytes(path_elsewhere),
+            mebibytes(re_elsewhere)
         ),
     ]
 }
@@ -159,7 +166,40 @@ fn materials(scene: &Scene) -> Vec<String> {
     used.chain(left_out(&unused)).chain(variations).collect()
 }
 
-/// Primary dimensions of the film position and, bounce by bounce, of the decisions there.
+/// Which mappings make whole images of the scene, and the techniques that are of use in it.
+fn mappings(features: &Features) -> Vec<String> {
+    let names = |kinds: &[MappingKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+    let (whole, part): (Vec<_>, Vec<_>) =
+        MappingKind::ALL.into_iter().partition(|kind| kind.misses(features).is_empty());
+    let mut lines = vec![format!("{}; auto tries {}", names(&whole), names(&trial::candidates(features)))];
+    lines.extend(
+        part.iter()
+            .map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),
+    );
+    let depth = Layout::new(features, false).max_depth();
+    let lit = (features.area_lights + features.infinite_lights > 0, "no light has an extent");
+    let smooth = (features.smooth_lobes, "all materials are perfect mirrors or glass");
+    let longer = |edges: u16| (depth >= edges, "paths are too short");
+    let techniques = [
+        ("camera subpaths that hit lights", vec![lit]),
+        ("next-event estimation", vec![smooth, longer(2)]),
+        ("light subpaths connected to the camera", vec![smooth, longer(2)]),
+        ("light subpaths joined to camera subpaths", vec![smooth, longer(3)]),
+    ];
+    let reason = |needs: &[(bool, &'static str)]| needs.iter().find(|(met, _)| !met).map(|(_, reason)| *reason);
+    let used: Vec<&str> =
+        techniques.iter().filter(|(_, needs)| reason(needs).is_none()).map(|(name, _)| *name).collect();
+    if !used.is_empty() {
+        lines.push(format!("techniques: {}", used.join(", ")));
+    }
+    lines.extend(
+        techniques.iter().filter_map(|(name, needs)| Some(format!("left out: {name}, for {}", reason(needs)?))),
+    );
+    lines
+}
+
+/// Primary dimensions of the film position and, bounce by bounce, of the decisions there; the same of the light subpath,
+/// where mappings have one.
 fn dimensions(features: &Features) -> Vec<String> {
     let layout = Layout::new(features, false);
     let of_camera = layout.describe_camera();
@@ -167,20 +207,17 @@ fn dimensions(features: &Features) -> Vec<String> {
         vec![runs(&of_camera).map(|run| format!("{}: {}", run[0], run.len())).collect::<Vec<_>>().join(", ")];
     // the last vertex of the longest paths decides nothing
     let bounces = layout.max_depth() - 1;
-    let first_of_each_kind = [Some(0), layout.roulette_from()].into_iter().flatten().filter(|first| *first < bounces);
-    let mut firsts: Vec<u16> = first_of_each_kind.collect();
-    firsts.dedup();
-    for (i, &first) in firsts.iter().enumerate() {
-        let next = firsts.get(i + 1).copied();
-        let range = match next.or(features.integrator.max_depth.map(|_| bounces)) {
-            Some(next) if next == first + 1 => format!("bounce {next}"),
-            Some(next) => format!("bounces {} to {next}", first + 1),
-            None => format!("bounces from {} on", first + 1),
-        };
-        let names = layout.describe(first);
-        let blocks = if layout.choices(first).is_some() { "two blocks" } else { "one block" };
-        lines.push(format!("{range}: {} ({}), drawn in {blocks} of four", names.len(), counted(&names)));
-    }
+    lines.extend(by_bounce(features, bounces, |bounce| {
+        (layout.describe(bounce), if layout.choices(bounce).is_some() { 2 } else { 1 })
+    }));
+    lines.push(format!("start of a light subpath, for all mappings but unidirectional: {}", drawn(&layout)));
+    // and the last of a light subpath is one before, as that is connected to the camera
+    lines.extend(
+        by_bounce(features, bounces.saturating_sub(1), |bounce| (layout.describe_light(bounce), 1))
+            .into_iter()
+            .map(|line| format!("its {line}")),
+    );
+    lines.push(format!("multiplexed: {}; no roulette", drawn(&Layout::new(features, true))));
     let mut unused = Vec::new();
     for (needed, what) in [
         (features.lens, "lens"),
@@ -194,6 +231,37 @@ fn dimensions(features: &Features) -> Vec<String> {
     }
     lines.extend(left_out(&unused));
     lines
+}
+
+/// What the start of a light subpath takes.
+fn drawn(layout: &Layout) -> String {
+    let blocks = if layout.light_choices().is_some() { 2 } else { 1 };
+    dimensions_and_blocks(&layout.describe_emission(), blocks)
+}
+
+/// A line for the bounces before roulette and one for those with it: names of dimensions and the blocks they are drawn in.
+fn by_bounce(features: &Features, bounces: u16, describe: impl Fn(u16) -> (Vec<&'static str>, usize)) -> Vec<String> {
+    let with_roulette = Layout::new(features, false).roulette_from();
+    let mut firsts: Vec<u16> =
+        [Some(0), with_roulette].into_iter().flatten().filter(|first| *first < bounces).collect();
+    firsts.dedup();
+    let line = |(i, &first): (usize, &u16)| {
+        let next = firsts.get(i + 1).copied();
+        let range = match next.or(features.integrator.max_depth.map(|_| bounces)) {
+            Some(next) if next == first + 1 => format!("bounce {next}"),
+            Some(next) => format!("bounces {} to {next}", first + 1),
+            None => format!("bounces from {} on", first + 1),
+        };
+        let (names, blocks) = describe(first);
+        format!("{range}: {}", dimensions_and_blocks(&names, blocks))
+    };
+    firsts.iter().enumerate().map(line).collect()
+}
+
+/// `3 (direction 2, roulette 1), drawn in one block of four`
+fn dimensions_and_blocks(names: &[&'static str], blocks: usize) -> String {
+    let blocks = if blocks > 1 { "two blocks" } else { "one block" };
+    format!("{} ({}), drawn in {blocks} of four", names.len(), counted(names))
 }
 
 /// `direction 2, roulette 1`: names that follow each other, with how often each does.

@@ -12,9 +12,10 @@ use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::film::file::{check_writable, write_whole};
 use crate::film::{Image, PixelFormat, Plane, Value, exr_file};
+use crate::path::MappingKind;
 use crate::render::progress::significant;
-use crate::render::{self, Job, Method, Observer, PacketChoice, RenderError, Settings, Status};
-use crate::scene::SceneDescription;
+use crate::render::{self, Job, MappingChoice, Method, Observer, PacketChoice, RenderError, Settings, Status};
+use crate::scene::{Features, SceneDescription};
 use crate::study::metrics::VARIANCE;
 use crate::study::reference::{
     OwnError, Passes, Recipe, accumulate, counted, fingerprint, pass_seed, read_state, write_state,
@@ -47,6 +48,11 @@ pub(super) struct Reference {
     /// many passes average out
     #[arg(long, default_value = "path", value_parser = values::method())]
     method: Method,
+
+    /// From random numbers to light paths, as for relt render; one for all passes, so no trial chooses it. All but light
+    /// give the same image in the end; light is refused where it would lack something
+    #[arg(long, value_name = "HOW", default_value = "unidirectional", value_parser = values::one_mapping())]
+    mapping: MappingKind,
 
     /// Mutations per pixel of a pass
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MUTATIONS_PER_PIXEL, allow_negative_numbers = true)]
@@ -86,6 +92,7 @@ pub(super) fn run(arguments: Reference) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let files = Files::new(&arguments.output)?;
     let description = arguments.scene.describe(arguments.threads, arguments.quiet)?;
+    arguments.misses_nothing(&description)?;
     let recipe = arguments.recipe(&description);
     let mut passes = files.passes(&recipe)?;
 
@@ -124,6 +131,7 @@ impl Reference {
     fn settings(&self) -> Result<Settings, Failure> {
         let settings = Settings {
             method: self.method,
+            mapping: MappingChoice::Fixed(self.mapping),
             seed: self.seed,
             threads: self.threads,
             pin: self.pin,
@@ -139,6 +147,18 @@ impl Reference {
         if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
     }
 
+    /// That passes by the mapping are whole images of the scene.
+    fn misses_nothing(&self, description: &SceneDescription) -> Result<(), Failure> {
+        let missed = self.mapping.misses(&Features::of(description));
+        if missed.is_empty() {
+            return Ok(());
+        }
+        let (name, missed) = (self.mapping.name(), missed.join(" and "));
+        Err(Failure::input(format_args!(
+            "--mapping {name}: a reference of this scene would lack {missed}; all others serve"
+        )))
+    }
+
     fn recipe(&self, description: &SceneDescription) -> Recipe {
         let defines = self.scene.defines.iter().map(|(name, value)| format!(" -D {name}={value}"));
         Recipe {
@@ -148,6 +168,7 @@ impl Reference {
             width: description.film.width,
             height: description.film.height,
             method: self.method.name().into(),
+            mapping: self.mapping.name().into(),
             mutations_per_pixel: self.mpp,
             seed: self.seed,
         }
@@ -282,7 +303,7 @@ impl Files {
 
 /// What the image's file says about how it was made: nothing that differs between a run and one with interruptions.
 ///
-/// Texts: `scene` (with definitions), `scene_fingerprint`, `method`, `seed`, `embree`. Numbers: `passes`,
+/// Texts: `scene` (with definitions), `scene_fingerprint`, `method`, `mapping`, `seed`, `embree`. Numbers: `passes`,
 /// `pass_mutations_per_pixel`, `mutations_per_pixel` and, from two passes on, `own_rmse`, `own_rel_mse` (by the spread of
 /// passes) and `own_rel_mse_halves`.
 fn metadata(recipe: &Recipe, embree: &str, passes: &Passes, error: Option<OwnError>) -> Vec<(String, Value)> {
@@ -291,6 +312,7 @@ fn metadata(recipe: &Recipe, embree: &str, passes: &Passes, error: Option<OwnErr
         ("scene", recipe.scene.as_str().into()),
         ("scene_fingerprint", recipe.fingerprint.as_str().into()),
         ("method", recipe.method.as_str().into()),
+        ("mapping", recipe.mapping.as_str().into()),
         ("seed", recipe.seed.to_string().into()),
         ("embree", embree.into()),
         ("passes", number.into()),
@@ -324,13 +346,14 @@ fn description(
         None => "one pass tells nothing about its own error".into(),
     };
     format!(
-        "relt {}, Embree {embree}; {}, {} × {} pixels\n{}, {} of {} mutations per pixel, {} mutations per pixel in all, \
-         seed {}\nmean [{r:.6}, {g:.6}, {b:.6}]; {quality}\n{}\n",
+        "relt {}, Embree {embree}; {}, {} × {} pixels\n{}, {} mapping, {} of {} mutations per pixel, {} mutations per pixel \
+         in all, seed {}\nmean [{r:.6}, {g:.6}, {b:.6}]; {quality}\n{}\n",
         recipe.relt,
         recipe.scene,
         recipe.width,
         recipe.height,
         recipe.method,
+        recipe.mapping,
         counted(number),
         recipe.mutations_per_pixel,
         number as f64 * recipe.mutations_per_pixel,

@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::embree::Width;
+use crate::path::MappingKind;
 use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, Normalisation, PacketChoice};
 
 /// `name=value`.
@@ -37,6 +38,11 @@ pub(super) fn method() -> impl TypedValueParser<Value = Method> {
 
 pub(super) fn mapping() -> impl TypedValueParser<Value = MappingChoice> {
     one_of(&MappingChoice::ALL, |mapping| mapping.name())
+}
+
+/// A mapping that is not left to a trial.
+pub(super) fn one_mapping() -> impl TypedValueParser<Value = MappingKind> {
+    one_of(&MappingKind::ALL, |mapping| mapping.name())
 }
 
 pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {

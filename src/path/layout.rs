@@ -109,6 +109,30 @@ impl Layout {
         names
     }
 
+    /// Names of the dimensions that decide how a light subpath starts, for people.
+    pub fn describe_emission(&self) -> Vec<&'static str> {
+        let mut names = vec!["place on light", "place on light", "direction", "direction"];
+        if self.light_choice {
+            names.push("light");
+        }
+        if self.technique_choice {
+            names.extend(["length", "technique"]);
+        }
+        names
+    }
+
+    /// Names of the dimensions that decide something at that bounce of a light subpath, for people.
+    pub fn describe_light(&self, bounce: u16) -> Vec<&'static str> {
+        let mut names = vec!["direction", "direction"];
+        if self.lobe_choice {
+            names.push("lobe");
+        }
+        if self.roulette(bounce) {
+            names.push("roulette");
+        }
+        names
+    }
+
     /// The bounce from which on roulette is played, if paths get so long.
     pub fn roulette_from(&self) -> Option<u16> {
         (self.roulette_from + 1 < self.max_depth).then_some(self.roulette_from)

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     sample::Proposals,
-    scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Scene},
+    scene::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile, Scene},
 };
 
 /// How points of the cube become light paths.
@@ -60,6 +60,18 @@ impl MappingKind {
             MappingKind::TwoWay => Techniques::TWO_WAY,
             MappingKind::Bidirectional | MappingKind::Multiplexed => Techniques::ALL,
         }
+    }
+
+    /// What images of that scene by the mapping lack, one phrase each: paths that none of its techniques makes.
+    pub fn misses(self, features: &Features) -> Vec<&'static str> {
+        if self.techniques().hit {
+            return Vec::new();
+        }
+        let missed = [
+            (features.delta_lobes, "whatever is seen in perfect mirrors, through smooth glass or through masks"),
+            (features.infinite_lights > 0, "the sky itself"),
+        ];
+        missed.into_iter().filter(|(missed, _)| *missed).map(|(_, what)| what).collect()
     }
 
     /// Whether points contribute to the film elsewhere than their first dimensions say.

@@ -96,7 +96,7 @@ impl Output {
 
 /// What an image file says about how it was made.
 ///
-/// Texts: `scene`, `method`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
+/// Texts: `scene`, `method`, `mapping`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
 /// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold), for `mlt`
 /// `normalisation_from` and `kelemen_weights` (true or false).
 /// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error` and for `mlt`
@@ -106,6 +106,7 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     let mut data: Vec<(&str, Value)> = vec![
         ("scene", start.scene.as_str().into()),
         ("method", start.settings.method.name().into()),
+        ("mapping", start.mapping.name().into()),
         ("seed", start.settings.seed.to_string().into()),
         ("features", start.features.join(", ").into()),
         ("embree", start.embree.as_str().into()),
@@ -238,6 +239,7 @@ mod tests {
         let value = |name: &str| read.metadata.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone());
         assert_eq!(value("scene"), Some("scenes/x.xml".into()));
         assert_eq!(value("method"), Some("re".into()));
+        assert_eq!(value("mapping"), Some("unidirectional".into()));
         assert_eq!(value("betas"), Some("0 1".into()));
         assert_eq!(value("mutations"), Some(77.0.into()));
         assert_eq!(value("normalisation_error"), Some(0.01.into()));

@@ -112,6 +112,7 @@ impl Observer for Progress {
             bar.set_message("starting");
         }
         self.say(&heading(start));
+        start.mapping_trial.iter().for_each(|why| self.say(why));
     }
 
     fn progress(&self, status: &Status) {
@@ -156,7 +157,7 @@ impl Observer for Progress {
     }
 }
 
-/// `scenes/door/scene.xml: 256 × 256, replica exchange with 4 replicas, 64 mutations per pixel, 2 threads`
+/// `scenes/door/scene.xml: 256 × 256, replica exchange with 4 replicas, light mapping, 64 mutations per pixel, 2 threads`
 pub fn heading(start: &RunStart) -> String {
     let settings = &start.settings;
     let mut words = vec![format!("{}: {} × {}", start.scene, start.width, start.height)];
@@ -172,6 +173,7 @@ pub fn heading(start: &RunStart) -> String {
             });
         }
     }
+    words.push(format!("{} mapping", start.mapping.name()));
     let mpp = settings.mutations_per_pixel.map(|mpp| format!("{mpp} mutations per pixel"));
     let time = settings.time.map(|time| humantime::format_duration(time).to_string());
     match (mpp, time) {
@@ -341,6 +343,7 @@ fn span(rates: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::path::MappingKind;
     use crate::render::settings::Settings;
     use crate::tempering::{LnEstimate, Normaliser, NormaliserEstimates};
 
@@ -386,6 +389,25 @@ mod tests {
     }
 
     #[test]
+    fn the_heading_names_the_mapping_and_a_line_says_why() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        let progress = Progress::plain(path.reopen().unwrap(), Verbosity::Normal, Arc::default());
+        let start = RunStart {
+            scene: "a.xml".into(),
+            threads: 2,
+            mapping: MappingKind::TwoWay,
+            mapping_trial: Some("two-way mapping: so it is".into()),
+            ..RunStart::default()
+        };
+        progress.started(&start);
+        let heading = "a.xml: 0 × 0, replica exchange, two-way mapping, 64 mutations per pixel, 2 threads";
+        let text = std::fs::read_to_string(path.path()).unwrap();
+        assert_eq!(text, format!("{heading}\ntwo-way mapping: so it is\n"));
+        progress.started(&RunStart { mapping_trial: None, ..start });
+        assert_eq!(std::fs::read_to_string(path.path()).unwrap().lines().count(), 3, "no line without a trial");
+    }
+
+    #[test]
     fn plain_lines_come_at_tenths_and_hold_no_escape_codes() {
         let path = tempfile::NamedTempFile::new().unwrap();
         let progress = Progress::plain(path.reopen().unwrap(), Verbosity::Normal, Arc::default());
@@ -410,7 +432,10 @@ mod tests {
         assert!(!text.contains('\x1b') && !text.contains('\r'), "{text}");
         assert_eq!(
             text.lines().next(),
-            Some("door.xml: 4 × 3, replica exchange with 4 replicas, 64 mutations per pixel or 1m 30s, 2 threads")
+            Some(
+                "door.xml: 4 × 3, replica exchange with 4 replicas, unidirectional mapping, 64 mutations per pixel or 1m \
+                 30s, 2 threads"
+            )
         );
         assert_eq!(text.lines().count(), 1 + 9 + 1, "{text}");
         assert!(text.lines().last().unwrap().ends_with("wrote a.exr and a.png"), "{text}");

@@ -75,24 +75,24 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
-    let (kind, trial) = match job.settings.mapping {
+    let (mapping, mapping_trial) = match job.settings.mapping {
         MappingChoice::Auto => {
-            let trial = pool.install(|| trial::try_mappings(job.scene, job.settings.seed));
+            let trial = pool.install(|| trial::try_mappings(job.scene, &job.settings));
             (trial.chosen, Some(trial.why()))
         }
-        MappingChoice::Fixed(kind) => (kind, None),
+        MappingChoice::Fixed(mapping) => (mapping, None),
     };
     let widths = match job.settings.packet {
-        PacketChoice::Auto => calibration::calibrate(job.scene, kind),
+        PacketChoice::Auto => calibration::calibrate(job.scene, mapping),
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
     };
     let film = job.scene.film;
     let stage = Stage {
-        mapping: Mapping::new(job.scene, kind, widths),
+        mapping: Mapping::new(job.scene, mapping, widths),
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(job.settings.seed),
     };
-    let start = RunStart { mapping: kind.name(), mapping_trial: trial, ..run_start(job, threads, widths) };
+    let start = RunStart { mapping, mapping_trial, ..run_start(job, threads, widths) };
     observer.started(&start);
     let mut watch = Watch { clock, set_up: SetUp::default(), last_round: None };
     watch.set_up.calibration = watch.clock.elapsed();
@@ -227,6 +227,11 @@ fn conclude(
         warnings.push(
             "the image is black: no independent path met light; is a light in reach of what the camera sees?".into(),
         );
+    }
+    let missed = start.mapping.misses(&job.scene.features);
+    if !missed.is_empty() {
+        let (name, missed) = (start.mapping.name(), missed.join(" and "));
+        warnings.push(format!("the image lacks {missed}: --mapping {name} makes no paths to that, all others do"));
     }
     if status.non_finite > 0 {
         warnings.push(format!(

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::output::Picture;
 use super::settings::Settings;
+use crate::path::MappingKind;
 use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
@@ -24,8 +25,8 @@ pub struct RunStart {
     /// Worker threads, in fact.
     pub threads: usize,
     /// The mapping, in fact.
-    pub mapping: &'static str,
-    /// Why that one, where a trial chose it.
+    pub mapping: MappingKind,
+    /// Why that one, where it was left to a trial.
     pub mapping_trial: Option<String>,
     /// Inverse temperatures of the rungs, in fact; empty where there is no ladder.
     pub betas: Vec<f64>,
@@ -82,7 +83,7 @@ pub struct Status {
 /// Wall time of a run before it works at full pace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SetUp {
-    /// Starting threads and measuring packet widths.
+    /// Starting threads, trying mappings and measuring packet widths.
     pub calibration: Duration,
     /// Independent samples before chains start.
     pub bootstrap: Duration,

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::settings::Settings;
 use crate::{
     chain::Evaluator,
     embree::Width,
@@ -16,40 +17,52 @@ use crate::{
 pub struct Trial {
     /// The mapping to render with.
     pub chosen: MappingKind,
-    /// The squared error of each mapping that was tried, at equal cost, by that of the unidirectional one.
+    /// The squared error of each mapping that was tried, at equal cost, by that of the unidirectional one; none where the
+    /// budget had no room for a trial.
     pub errors: Vec<(MappingKind, f64)>,
 }
 
-/// Points of each mapping.
+/// Points of each mapping, at most.
 const POINTS: u64 = 1 << 15;
+/// Points of each mapping that tell something; with fewer the errors themselves err by more than mappings differ.
+const FEWEST_POINTS: u64 = 1 << 12;
+/// The part of a run's budget that its trial may take.
+const SHARE: f64 = 1.0 / 8.0;
+/// Points a second that a budget in time is taken for: about what one thread makes of the shipped scenes, all mappings
+/// together. A number, not a measurement, for the choice must not depend on the machine's mood.
+const PACE: f64 = 4e5;
 /// Points that are evaluated together.
 const LANES: u64 = 256;
 /// Tiles of the film a side, at most.
 const TILES: u32 = 16;
+/// Cells of a tile a side, at most.
+const CELLS: u32 = 4;
+/// Points of a cell on the average, at the least.
+const POINTS_A_CELL: u64 = 8;
 /// How much less the error of another mapping must be for it to take the unidirectional one's place. Errors of mappings
 /// that are alike differ by as much from trial to trial.
 const CLEARLY_LESS: f64 = 0.6;
-/// What a point costs beside its rays, in rays: random numbers, camera, recording.
-const COST_OF_A_POINT: f64 = 3.0;
 /// Luminance, by the mean, below which errors count in absolute terms; as in [`Measure`](crate::chain::Measure).
 const FLOOR: f64 = 0.5;
 
 /// The mappings that could serve a scene.
-fn candidates(features: &Features) -> Vec<MappingKind> {
-    let all_is_seen = !features.delta_lobes && features.infinite_lights == 0;
-    let serves = |kind: &MappingKind| match kind {
-        MappingKind::Light => all_is_seen,
-        MappingKind::Multiplexed => false, // one technique a point: never less noise than all, and seldom less error
-        _ => true,
-    };
+pub fn candidates(features: &Features) -> Vec<MappingKind> {
+    // multiplexed has one technique a point: never less noise than all, and seldom less error
+    let serves = |kind: &MappingKind| *kind != MappingKind::Multiplexed && kind.misses(features).is_empty();
     MappingKind::ALL.into_iter().filter(serves).collect()
 }
 
-/// Tries all mappings that could serve the scene on some thousand uniform points each. A function of scene and seed alone:
-/// costs are counted in rays, not in seconds.
-pub fn try_mappings(scene: &Scene, seed: u64) -> Trial {
+/// Tries all mappings that could serve the scene on some thousand uniform points each, as far as the budget has room for
+/// that. A function of scene, seed and budget alone: costs are counted in rays, not in seconds.
+pub fn try_mappings(scene: &Scene, settings: &Settings) -> Trial {
     let kinds = candidates(&scene.features);
-    let found: Vec<Found> = kinds.iter().map(|kind| Found::new(scene, *kind, Rng::new(seed))).collect();
+    let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    let points = points_of_each(settings, pixels, kinds.len());
+    if points < FEWEST_POINTS {
+        return Trial { chosen: MappingKind::Unidirectional, errors: Vec::new() };
+    }
+    let rng = Rng::new(settings.seed);
+    let found: Vec<Found> = kinds.iter().map(|kind| Found::new(scene, *kind, rng, points)).collect();
     let sharpest = found
         .iter()
         .min_by(|a, b| a.spread().total_cmp(&b.spread()))
@@ -66,20 +79,30 @@ pub fn try_mappings(scene: &Scene, seed: u64) -> Trial {
     Trial { chosen, errors }
 }
 
+/// Points for each of so many mappings, in whole batches.
+fn points_of_each(settings: &Settings, pixels: u64, mappings: usize) -> u64 {
+    let mutations = settings.mutations_per_pixel.map(|mpp| mpp * pixels as f64);
+    let in_time = settings.time.map(|time| time.as_secs_f64() * PACE);
+    let budget = mutations.into_iter().chain(in_time).fold(f64::INFINITY, f64::min);
+    let each = (SHARE * budget / mappings as f64) as u64; // all of u64 where there is no end
+    each.min(POINTS) / LANES * LANES
+}
+
 impl Trial {
-    /// Why the choice is what it is, in a sentence.
+    /// Why the choice is what it is, in a line.
     pub fn why(&self) -> String {
+        let chosen = self.chosen.name();
+        if self.errors.is_empty() {
+            return format!("{chosen} mapping: the budget leaves no room for a trial of others; --mapping names one");
+        }
         let others: Vec<String> = self
             .errors
             .iter()
             .filter(|(kind, _)| *kind != MappingKind::Unidirectional)
             .map(|(kind, error)| format!("{} {error:.2}", kind.name()))
             .collect();
-        format!(
-            "{} mapping; squared errors at equal cost, by that of unidirectional: {}",
-            self.chosen.name(),
-            others.join(", ")
-        )
+        let others = others.join(", ");
+        format!("{chosen} mapping: squared errors at equal cost in a trial, unidirectional 1, {others}")
     }
 }
 
@@ -87,43 +110,78 @@ impl Trial {
 struct Found {
     /// Mean luminance, and the variance of that mean.
     tiles: Vec<[f64; 2]>,
-    /// Of a point, in rays.
+    /// Of a point, in rays. By `path` on the shipped scenes a ray with all that hangs on it takes as long in any of these
+    /// mappings, within a fifth or so either way (a quarter less with `bidirectional`, whose rays are mostly shadow rays).
     cost: f64,
 }
 
-/// Sums over one tile.
+/// The film in tiles, for which errors are known, and those in cells, within which points' main contributions are taken to
+/// vary by chance alone: methods stratify film positions, so that an edge across a tile makes no error.
+#[derive(Clone, Copy)]
+struct Grid {
+    /// Tiles a row, and rows.
+    tiles: [u32; 2],
+    /// Cells of a tile a side.
+    cells: u32,
+}
+
+/// Sums over one cell of the film.
 #[derive(Clone, Copy, Default)]
-struct Tile {
+struct Cell {
     /// Points whose main position it has, Σ of what they contribute there, and of its square.
     main: [f64; 3],
     /// The same of what all points contribute to it elsewhere, but for the first.
     elsewhere: [f64; 2],
 }
 
+impl Grid {
+    fn new(scene: &Scene, points: u64) -> Grid {
+        let tiles = [scene.film.width.min(TILES), scene.film.height.min(TILES)];
+        let [columns, rows] = tiles;
+        let fits = |cells: &u32| {
+            let all = u64::from(columns * rows * cells * cells);
+            // no finer than pixels
+            scene.film.width.min(scene.film.height) / TILES >= *cells && points / all >= POINTS_A_CELL
+        };
+        Grid { tiles, cells: (1..=CELLS).rev().find(fits).unwrap_or(1) }
+    }
+
+    fn side(&self) -> [u32; 2] {
+        self.tiles.map(|n| n * self.cells)
+    }
+
+    /// The cell with that place of the film.
+    fn cell(&self, film: [f32; 2]) -> usize {
+        let side = self.side();
+        let [x, y] = [0, 1].map(|i| ((film[i] * side[i] as f32) as u32).min(side[i] - 1));
+        (y * side[0] + x) as usize
+    }
+
+    /// The tile that a cell is in.
+    fn tile(&self, cell: usize) -> usize {
+        let columns = self.side()[0];
+        let [x, y] = [cell as u32 % columns, cell as u32 / columns].map(|n| n / self.cells);
+        (y * self.tiles[0] + x) as usize
+    }
+}
+
 impl Found {
-    fn new(scene: &Scene, kind: MappingKind, rng: Rng) -> Found {
+    fn new(scene: &Scene, kind: MappingKind, rng: Rng, points: u64) -> Found {
         let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
         let mapping = Mapping::new(scene, kind, widths);
-        let side = [scene.film.width.min(TILES), scene.film.height.min(TILES)];
-        let batches: Vec<(Vec<Tile>, u64)> =
-            (0..POINTS / LANES).into_par_iter().map(|batch| one_batch(&mapping, rng, batch, side)).collect();
-        let mut sums = vec![Tile::default(); (side[0] * side[1]) as usize];
-        for (tiles, _) in &batches {
-            for (sum, tile) in sums.iter_mut().zip(tiles) {
-                sum.main.iter_mut().zip(tile.main).for_each(|(a, b)| *a += b);
-                sum.elsewhere.iter_mut().zip(tile.elsewhere).for_each(|(a, b)| *a += b);
+        let grid = Grid::new(scene, points);
+        let batches: Vec<(Vec<Cell>, u64)> =
+            (0..points / LANES).into_par_iter().map(|batch| one_batch(&mapping, rng, batch, grid)).collect();
+        let [columns, rows] = grid.side();
+        let mut sums = vec![Cell::default(); (columns * rows) as usize];
+        for (cells, _) in &batches {
+            for (sum, cell) in sums.iter_mut().zip(cells) {
+                sum.main.iter_mut().zip(cell.main).for_each(|(a, b)| *a += b);
+                sum.elsewhere.iter_mut().zip(cell.elsewhere).for_each(|(a, b)| *a += b);
             }
         }
         let rays: u64 = batches.iter().map(|(_, rays)| rays).sum();
-        let (n, tiles) = (POINTS as f64, sums.len() as f64);
-        let of_tile = |tile: &Tile| {
-            let [points, sum, squares] = tile.main;
-            let mean = if points > 0.0 { sum / points } else { 0.0 };
-            let variance = if points > 0.0 { (squares / points - mean * mean).max(0.0) / points } else { 0.0 };
-            let [more, more_squares] = tile.elsewhere;
-            [mean + more * tiles / n, variance + more_squares * (tiles / n).powi(2)]
-        };
-        Found { tiles: sums.iter().map(of_tile).collect(), cost: rays as f64 / n + COST_OF_A_POINT }
+        Found { tiles: tiles(grid, &sums, points as f64), cost: rays as f64 / points as f64 }
     }
 
     fn mean(&self) -> f64 {
@@ -138,39 +196,107 @@ impl Found {
         }
     }
 
-    /// Squared relative error: the variance, and what is missing beside the mapping that knows best, beyond what both
-    /// may err. (Where light is hard to find, what has not been found does not show in the variance.)
+    /// Squared relative error: the variance, or the distance from the mapping that knows best, beyond what that one may
+    /// err, where this is more. (Where light is hard to find, what has not been found does not show in the variance.)
+    /// Compared in sum: tile by tile, distances that chance made large would count and small ones would not.
     fn error(&self, best: &Found) -> f64 {
         let floor = (FLOOR * best.mean()).powi(2);
-        let of_tile = |([mean, variance], [known, its_variance]): (&[f64; 2], &[f64; 2])| {
-            let missing = ((mean - known).powi(2) - variance - its_variance).max(0.0);
-            (variance + missing) / (known * known + floor)
-        };
-        self.tiles.iter().zip(&best.tiles).map(of_tile).sum()
+        let [mut by_variance, mut by_distance] = [0.0; 2];
+        for ([mean, variance], [known, its_variance]) in self.tiles.iter().zip(&best.tiles) {
+            let unit = known * known + floor;
+            by_variance += variance / unit;
+            by_distance += ((mean - known).powi(2) - its_variance) / unit;
+        }
+        by_distance.max(by_variance)
     }
 }
 
-/// What one batch of points adds to each tile, and its rays.
-fn one_batch(mapping: &Mapping, rng: Rng, batch: u64, side: [u32; 2]) -> (Vec<Tile>, u64) {
+/// Means of tiles, each with its variance, from the sums of their cells over so many points.
+fn tiles(grid: Grid, cells: &[Cell], points: f64) -> Vec<[f64; 2]> {
+    /// Of a tile: points, Σ of what they contribute, Σ of squared distances from their cells' means, degrees of freedom.
+    #[derive(Clone, Copy, Default)]
+    struct Tile {
+        main: [f64; 4],
+        elsewhere: [f64; 2],
+    }
+    let [columns, rows] = grid.tiles;
+    let mut tiles = vec![Tile::default(); (columns * rows) as usize];
+    for (i, cell) in cells.iter().enumerate() {
+        let tile = &mut tiles[grid.tile(i)];
+        let [n, sum, squares] = cell.main;
+        let within = if n > 0.0 { (squares - sum * sum / n).max(0.0) } else { 0.0 };
+        tile.main.iter_mut().zip([n, sum, within, (n - 1.0).max(0.0)]).for_each(|(a, b)| *a += b);
+        tile.elsewhere.iter_mut().zip(cell.elsewhere).for_each(|(a, b)| *a += b);
+    }
+    let of_chance = |a: f64, n: f64| if n > 0.0 { a / n } else { 0.0 };
+    let number = tiles.len() as f64;
+    let of_tile = |tile: &Tile| {
+        let [n, sum, within, freedom] = tile.main;
+        let [more, more_squares] = tile.elsewhere;
+        let variance = of_chance(of_chance(within, freedom), n);
+        [of_chance(sum, n) + more * number / points, variance + more_squares * (number / points).powi(2)]
+    };
+    tiles.iter().map(of_tile).collect()
+}
+
+/// What one batch of points adds to each cell, and its rays.
+fn one_batch(mapping: &Mapping, rng: Rng, batch: u64, grid: Grid) -> (Vec<Cell>, u64) {
     let counter = |lane: u64| Counter { ladder: lane as u32, replica: 0, step: batch, purpose: Purpose::Trial };
     let mut evaluator = Evaluator::new(rng, (0..LANES).map(counter).collect());
     evaluator.moves.fill(Move::Fresh);
     evaluator.evaluate(mapping, &Points::new(0));
-    let mut tiles = vec![Tile::default(); (side[0] * side[1]) as usize];
-    let at = |film: [f32; 2]| {
-        let [x, y] = [0, 1].map(|i| ((film[i] * side[i] as f32) as u32).min(side[i] - 1));
-        (y * side[0] + x) as usize
-    };
+    let [columns, rows] = grid.side();
+    let mut cells = vec![Cell::default(); (columns * rows) as usize];
     for lane in 0..LANES as usize {
         let Whole { main, elsewhere } = evaluator.out.whole(lane);
         let value = f64::from(luminance(main.rgb));
-        let tile = &mut tiles[at(main.film)];
-        tile.main.iter_mut().zip([1.0, value, value * value]).for_each(|(a, b)| *a += b);
+        let cell = &mut cells[grid.cell(main.film)];
+        cell.main.iter_mut().zip([1.0, value, value * value]).for_each(|(a, b)| *a += b);
         for splat in elsewhere {
             let value = f64::from(luminance(splat.rgb));
-            let tile = &mut tiles[at(splat.film)];
-            tile.elsewhere.iter_mut().zip([value, value * value]).for_each(|(a, b)| *a += b);
+            let cell = &mut cells[grid.cell(splat.film)];
+            cell.elsewhere.iter_mut().zip([value, value * value]).for_each(|(a, b)| *a += b);
         }
     }
-    (tiles, evaluator.out.rays)
+    (cells, evaluator.out.rays)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_trial_takes_an_eighth_of_the_budget_at_most() {
+        let points = |mutations_per_pixel, time| {
+            let settings = Settings { mutations_per_pixel, time, ..Settings::default() };
+            points_of_each(&settings, 100 * 100, 4)
+        };
+        assert_eq!(points(Some(1e6), None), POINTS);
+        assert_eq!(points(None, Some(Duration::from_secs(3600))), POINTS);
+        assert_eq!(points(Some(32.0), None), 10_000 / LANES * LANES);
+        assert_eq!(points(Some(1e6), Some(Duration::from_millis(500))), 6250 / LANES * LANES);
+        assert_eq!(points(Some(1e-3), Some(Duration::from_secs(3600))), 0);
+    }
+
+    #[test]
+    fn an_edge_between_cells_is_no_error() {
+        // one tile of two cells a side: dark at the left, bright at the right, three points each
+        let grid = Grid { tiles: [1, 1], cells: 2 };
+        let cell = |value: f64| Cell { main: [3.0, 3.0 * value, 3.0 * value * value], elsewhere: [0.0; 2] };
+        assert_eq!(tiles(grid, &[cell(0.0), cell(4.0), cell(0.0), cell(4.0)], 12.0), [[2.0, 0.0]]);
+        // in one cell 0, 1 and 2 about a mean of 1: Σ of squared distances 2, with 8 degrees of freedom, over 12 points
+        let noisy = Cell { main: [3.0, 3.0, 5.0], elsewhere: [0.0; 2] };
+        let [[mean, variance]] = tiles(grid, &[noisy, cell(4.0), cell(0.0), cell(4.0)], 12.0)[..] else { panic!() };
+        assert!((mean - 2.25).abs() < 1e-12 && (variance - 2.0 / 8.0 / 12.0).abs() < 1e-12, "{mean} {variance}");
+    }
+
+    #[test]
+    fn cells_are_within_their_tiles() {
+        let grid = Grid { tiles: [3, 2], cells: 4 };
+        for (film, tile) in [([0.0, 0.0], 0), ([0.34, 0.1], 1), ([0.99, 0.49], 2), ([0.3, 0.6], 3), ([1.0, 1.0], 5)] {
+            assert_eq!(grid.tile(grid.cell(film)), tile, "{film:?}");
+        }
+    }
 }

@@ -16,6 +16,7 @@ use super::checksum::Checksum;
 use super::metrics::{FLOOR, Reference};
 use crate::film::Image;
 use crate::film::file::{FileError, write_whole};
+use crate::path::MappingKind;
 use crate::rng::{Counter, Purpose, Rng};
 use crate::scene::SceneDescription;
 
@@ -203,10 +204,17 @@ pub struct Recipe {
     pub height: u32,
     /// Name of the method.
     pub method: String,
+    /// Name of the mapping; states that do not tell are from before there was more than one.
+    #[serde(default = "only_mapping_once")]
+    pub mapping: String,
     /// Of one pass.
     pub mutations_per_pixel: f64,
     /// Of the whole.
     pub seed: u64,
+}
+
+fn only_mapping_once() -> String {
+    MappingKind::Unidirectional.name().into()
 }
 
 impl Recipe {
@@ -221,6 +229,7 @@ impl Recipe {
         differ("relt", self.relt.clone(), other.relt.clone());
         differ("size", format!("{} × {}", self.width, self.height), format!("{} × {}", other.width, other.height));
         differ("--method", self.method.clone(), other.method.clone());
+        differ("--mapping", self.mapping.clone(), other.mapping.clone());
         differ("--mpp", self.mutations_per_pixel.to_string(), other.mutations_per_pixel.to_string());
         differ("--seed", self.seed.to_string(), other.seed.to_string());
         if self.fingerprint != other.fingerprint {
@@ -416,6 +425,7 @@ mod tests {
             width: SIZE,
             height: SIZE,
             method: "path".into(),
+            mapping: "two-way".into(),
             mutations_per_pixel: 128.0,
             seed: u64::MAX,
         }
@@ -441,8 +451,15 @@ mod tests {
         let file = folder.path().join("r.state");
         write_state(&file, &recipe(), &of_passes(2, 0.3)).unwrap();
         let message = |recipe: &Recipe| read_state(&file, recipe).unwrap_err().to_string();
-        let text = message(&Recipe { method: "mlt".into(), mutations_per_pixel: 0.5, seed: 3, ..recipe() });
-        for part in ["--method path, not mlt", "--mpp 128, not 0.5", "not 3", "delete it to begin anew"] {
+        let [method, mapping] = ["mlt", "light"].map(str::to_owned);
+        let text = message(&Recipe { method, mapping, mutations_per_pixel: 0.5, seed: 3, ..recipe() });
+        for part in [
+            "--method path, not mlt",
+            "--mapping two-way, not light",
+            "--mpp 128, not 0.5",
+            "not 3",
+            "delete it to begin anew",
+        ] {
             assert!(text.contains(part), "{part:?} is not in: {text}");
         }
         assert!(message(&Recipe { width: 16, ..recipe() }).contains("size 32 × 32, not 16 × 32"));

@@ -78,8 +78,9 @@ impl ReferenceProgress {
 
     /// The work begins.
     pub fn begun(&self, recipe: &Recipe, passes: &Passes) {
-        let Recipe { scene, width, height, method, mutations_per_pixel: mpp, .. } = recipe;
-        let words = format!("{scene}: {width} × {height}, passes of {mpp} mutations per pixel by {method}");
+        let Recipe { scene, width, height, method, mapping, mutations_per_pixel: mpp, .. } = recipe;
+        let words =
+            format!("{scene}: {width} × {height}, passes of {mpp} mutations per pixel by {method}, {mapping} mapping");
         match passes.number() {
             0 => self.say(&words),
             n => self.say(&format!("{words}, going on after {}", counted(n))),

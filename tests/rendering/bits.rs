@@ -2,9 +2,10 @@
 
 use relt::embree::Width;
 use relt::film::{Image, Plane};
+use relt::path::MappingKind;
 use relt::render::{
-    Combine, LadderChoice, Method, MltSettings, Normalisation, Observer, Outcome, PacketChoice, Picture, Settings,
-    Status,
+    Combine, LadderChoice, MappingChoice, Method, MltSettings, Normalisation, Observer, Outcome, PacketChoice, Picture,
+    Settings, Status,
 };
 use relt::scene::Scene;
 
@@ -81,6 +82,24 @@ fn threads_packets_and_watchers_do_not_change_a_bit() {
             }
             let got = bits(&render(&scene, &with(2, Width::W4), &Photographer));
             assert!(got == expected, "{name}: with a snapshot after every slice: {settings:?}");
+        }
+    }
+}
+
+#[test]
+fn threads_and_packets_do_not_change_a_bit_of_subpaths_from_both_ends() {
+    let scene = own("lattice", &[("res", "24")]);
+    for mapping in [MappingKind::Bidirectional, MappingKind::Multiplexed].map(MappingChoice::Fixed) {
+        for method in Method::ALL {
+            let with = |threads, width| Settings {
+                mapping,
+                threads: Some(threads),
+                packet: PacketChoice::Fixed(width),
+                ..settings(method, MUTATIONS, 11)
+            };
+            let expected = bits(&render(&scene, &with(1, Width::W1), &()));
+            let got = bits(&render(&scene, &with(2, Width::W8), &()));
+            assert!(got == expected, "{} mapping, {}", mapping.name(), method.name());
         }
     }
 }

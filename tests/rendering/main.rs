@@ -1,6 +1,6 @@
 //! Whole pictures, from scene file to image, against what is known of them.
 //!
-//! [`mapping`] batch against scalar; [`furnace`] scenes whose image is a formula; [`references`] scenes rendered by
+//! [`mapping`] batch against scalar; [`choice`] which mapping is chosen; [`furnace`] scenes whose image is a formula; [`references`] scenes rendered by
 //! another program to little noise; [`mitsuba`] small scenes with one feature each, the same; [`scattering`] materials
 //! value by value, the same; [`bits`] what must not change a bit; [`darkness`] scenes without light, with hardly any and
 //! with too much.
@@ -9,6 +9,7 @@
 //! level, and leave the table and images of a failure under `target/test-evidence/NAME`.
 
 mod bits;
+mod choice;
 mod darkness;
 mod furnace;
 mod mapping;

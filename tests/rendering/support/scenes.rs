@@ -9,7 +9,7 @@ use relt::path::{MappingKind, Widths};
 use relt::render::{Job, MappingChoice, Method, Observer, Outcome, PacketChoice, Settings, run};
 use relt::scene::Scene;
 
-/// The repository's own scenes.
+/// The repository's own scenes that have references.
 pub const OWN: [&str; 3] = ["cornell-box", "caustic", "lattice"];
 
 /// A place in the repository.
@@ -26,7 +26,7 @@ pub fn load(path: &Path, defines: &[(&str, &str)]) -> Scene {
     Scene::new(device, description).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// One of [`OWN`].
+/// A scene of the repository.
 pub fn own(name: &str, defines: &[(&str, &str)]) -> Scene {
     load(&repository("scenes").join(name).join("scene.xml"), defines)
 }
