@@ -1,6 +1,6 @@
 //! From points of the unit cube to light paths and what they contribute.
 //!
-//! [`Mapping`] evaluates batches: [`unidirectional`] camera paths, or [`bidirectional`] paths from both ends.
+//! [`Mapping`] evaluates batches: `unidirectional` camera paths, or [`bidirectional`] paths from both ends.
 //! [`scalar`] and [`bidirectional::scalar`] say the same for one point at a time, to be read and tested against.
 
 pub mod bidirectional;
