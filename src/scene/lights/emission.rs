@@ -242,8 +242,14 @@ mod tests {
         for light in lights().iter().chain([&bent()]) {
             let mut some = 0;
             for e in emissions(light, 0, 4096).filter_map(|(e, _)| e) {
-                some += 1;
                 assert_eq!(e.kind, light.kind());
+                if e.kind == EmitterKind::Surface {
+                    assert!((e.of_place * e.pdf_place - Rgb::ONE).abs().max_element() < 1e-5, "{e:?} of {light:?}");
+                }
+                some += u32::from(e.weight != Rgb::ZERO);
+                if e.pdf_rest == 0.0 {
+                    continue; // behind the shading normal
+                }
                 assert!((e.direction.length() - 1.0).abs() < 1e-5, "{e:?}");
                 let [place, rest] = light.emission_pdf::<FullProfile>(e.normals, e.direction, SCENE);
                 assert_eq!(rest, e.pdf_rest, "{e:?} of {light:?}");
@@ -267,7 +273,9 @@ mod tests {
                 let Some(e) = e else { continue };
                 let [geometric, shading] = e.normals;
                 assert!(e.ng.dot(shading) >= 0.0 && (e.ng == geometric || e.ng == -geometric), "{e:?}");
-                assert!(e.direction.dot(e.ng) > 0.0 && e.direction.dot(shading) > 0.0, "{e:?}");
+                assert!(e.direction.dot(e.ng) > 0.0, "{e:?}");
+                let leaves = e.direction.dot(shading) > 0.0;
+                assert_eq!([e.weight != Rgb::ZERO, e.pdf_rest > 0.0], [leaves; 2], "{e:?}");
                 let any = warp::sphere(u);
                 let [_, rest] = light.emission_pdf::<FullProfile>(e.normals, any, SCENE);
                 assert_eq!(rest > 0.0, any.dot(e.ng) > 0.0 && any.dot(shading) > 0.0, "{any}, {e:?}");
