@@ -2,7 +2,7 @@
 //!
 //! Source: Kelemen et al. 2002; the paper's comparison renders with it in two passes.
 
-use super::{Evaluator, Recorder, Start, Target, Walkers, replay};
+use super::{Evaluator, Recorder, Start, TECHNIQUE_CHANGES, Target, TechniqueChanges, Walkers, replay};
 use crate::{
     path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -48,6 +48,8 @@ pub struct Baseline<W> {
     /// Uniform number of each lane's decision at this step.
     decisions: Vec<f64>,
     steps: u64,
+    /// Changes of technique.
+    pub changed: TechniqueChanges,
     /// Σ of acceptance probabilities of small steps and how many there were.
     pub small: (f64, u64),
     /// The same of large steps.
@@ -76,6 +78,7 @@ impl<W: Default> Baseline<W> {
             evaluator,
             large_steps,
             decisions: vec![0.0; starts.len()],
+            changed: TechniqueChanges::default(),
             steps: 0,
             small: (0.0, 0),
             large: (0.0, 0),
@@ -95,13 +98,21 @@ impl<W: Default> Baseline<W> {
         for lane in 0..self.decisions.len() {
             self.evaluator.counters[lane].step = self.steps;
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
-            let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
+            let [decision, kind, technique, _] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
             let large = kind < self.large_steps.probability;
             self.evaluator.moves[lane] = if large { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
+            if !large && target.changes_techniques() && technique < TECHNIQUE_CHANGES {
+                self.evaluator.change_technique(target, &self.walkers.points, lane, 1.0);
+            }
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
+            if self.evaluator.moves[lane] == Move::Rest {
+                self.walkers.stay(lane);
+                self.changed.stayed += 1;
+                continue;
+            }
             let proposed = self.evaluator.out.whole(lane);
             let small = self.evaluator.moves[lane] != Move::Fresh;
             if !small {
@@ -113,9 +124,14 @@ impl<W: Default> Baseline<W> {
             let u = self.decisions[lane];
             let large_steps = self.large_steps;
             let Evaluator { points, out, .. } = &self.evaluator;
-            let alpha = self.walkers.step(lane, 1.0, (points, lane), out, u, &mut |state, weight| {
+            let law = (1.0, self.evaluator.expected(lane));
+            let alpha = self.walkers.step_expecting(lane, law, (points, lane), out, u, &mut |state, weight| {
                 large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
             });
+            if self.evaluator.moves[lane] == Move::Given {
+                self.changed.count(alpha);
+                continue;
+            }
             let count = if small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
         }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::Importance;
 use crate::{
     path::{Contributions, Mapping, Workspace},
-    rng::{Counter, Rng},
-    sample::{Move, Points, Proposals},
+    rng::{Counter, Purpose, Rng},
+    sample::{Block, Move, Points, Proposals},
 };
 
 /// A non-negative function on the unit cube, evaluated for a batch of points at a time.
@@ -19,6 +19,25 @@ pub trait Target: Sync {
     /// Evaluates the proposals of all lanes that do not rest, drawing the blocks it needs.
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace);
 
+    /// Whether chains are to take [`change_technique`](Target::change_technique) for some of their steps.
+    fn changes_techniques(&self) -> bool {
+        false
+    }
+
+    /// Draws another way to say what the point of a lane says, whose blocks go to the same lane of `to`: a step that leaves
+    /// the distribution g^β unchanged if accepted with min(1, (g′/g · e^−Δ)^β), Δ the returned expected change of ln g.
+    /// `None`: the chain stays where it is. `random` gives uniform blocks, `rays` counts those traced.
+    fn change_technique(
+        &self,
+        _current: (&Points, usize),
+        _beta: f64,
+        _random: &mut dyn FnMut() -> Block,
+        _to: &mut Points,
+        _rays: &mut u64,
+    ) -> Option<f64> {
+        None
+    }
+
     /// Whether points may contribute elsewhere than at their own film positions.
     fn splats_elsewhere(&self) -> bool {
         false
@@ -30,6 +49,21 @@ impl Target for Mapping<'_> {
 
     fn splats_elsewhere(&self) -> bool {
         self.kind().splats_elsewhere()
+    }
+
+    fn changes_techniques(&self) -> bool {
+        self.technique_changes()
+    }
+
+    fn change_technique(
+        &self,
+        current: (&Points, usize),
+        beta: f64,
+        random: &mut dyn FnMut() -> Block,
+        to: &mut Points,
+        rays: &mut u64,
+    ) -> Option<f64> {
+        Mapping::change_technique(self, current, beta, random, to, rays)
     }
 
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
@@ -46,6 +80,9 @@ pub struct Evaluator<W> {
     pub film: [u32; 2],
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
+    /// The blocks of lanes whose techniques change, and the expected change of ln g.
+    given: Points,
+    expected: Vec<f64>,
     /// The proposed points.
     pub points: Points,
     /// What they contribute.
@@ -70,6 +107,8 @@ impl<W: Default> Evaluator<W> {
             film: [1, 1],
             importance: None,
             counters,
+            given: Points::new(lanes),
+            expected: vec![0.0; lanes],
             points: Points::new(lanes),
             out: Contributions::new(lanes),
             workspace,
@@ -86,11 +125,31 @@ impl<W: Default> Evaluator<W> {
         self.rng
     }
 
+    /// Makes a lane's next move a change of technique at that inverse temperature, or rest where there is nothing to change.
+    pub fn change_technique<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points, lane: usize, beta: f64) {
+        let counter = Counter { purpose: Purpose::Technique, ..self.counters[lane] };
+        let mut blocks = 0..u16::MAX;
+        let mut random = || self.rng.words(counter, blocks.next().expect("paths are shorter"));
+        let rays = &mut self.out.rays;
+        self.given.clear(lane);
+        let change = target.change_technique((current, lane), beta, &mut random, &mut self.given, rays);
+        self.moves[lane] = if change.is_some() { Move::Given } else { Move::Rest };
+        self.expected[lane] = change.unwrap_or(0.0);
+    }
+
+    /// The change of ln g that is expected of a lane's proposal, which acceptance is to discount: 0 but for changes of
+    /// technique.
+    #[inline(always)]
+    pub fn expected(&self, lane: usize) -> f64 {
+        if self.moves[lane] == Move::Given { self.expected[lane] } else { 0.0 }
+    }
+
     /// Draws and evaluates a proposal in every lane that does not rest; small steps start at `current`.
     pub fn evaluate<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points) {
         let mut proposals = Proposals {
             rng: self.rng,
             current,
+            given: &self.given,
             points: &mut self.points,
             counters: &self.counters,
             moves: &self.moves,

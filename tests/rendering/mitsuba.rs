@@ -66,16 +66,7 @@ fn light_tracing_beside_camera_paths_is_what_mitsuba_makes_of_both() {
 /// what shines behind their geometric normals is found from the camera only.)
 #[test]
 fn light_tracing_is_what_mitsuba_makes_of_paths() {
-    let names = [
-        "crop",
-        "cylinder-light",
-        "disk-light",
-        "flipped",
-        "picture-lights",
-        "point",
-        "sphere-light",
-        "spots",
-    ];
+    let names = ["crop", "cylinder-light", "disk-light", "flipped", "picture-lights", "point", "sphere-light", "spots"];
     check_with("light", &with(Method::Path, MappingKind::Light, 512.0), 0.02, &names);
 }
 

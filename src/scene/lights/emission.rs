@@ -93,6 +93,21 @@ pub struct Emission {
     pub light: u32,
 }
 
+/// The numbers for which a light starts a subpath at a certain place in a certain direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionInverse {
+    /// Those of the place; `None` where any will do.
+    pub place: Option<[f32; 2]>,
+    /// Those of the direction.
+    pub direction: [f32; 2],
+}
+
+/// The inverse of [`from_surface`]'s direction.
+pub(super) fn invert_surface(place: [f32; 2], normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+    let local = Frame::new(shining_side(normals)).to_local(direction);
+    (local.z > 0.0).then(|| EmissionInverse { place: Some(place), direction: warp::from_cosine_hemisphere(local) })
+}
+
 /// The geometric normal on the side that shines: that of the shading normal.
 #[inline(always)]
 fn shining_side([geometric, shading]: [Vec3; 2]) -> Vec3 {
