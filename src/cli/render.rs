@@ -414,7 +414,7 @@ mod tests {
     fn only_chains_that_have_techniques_change_them() {
         for given in [&["--technique-changes", "on"][..], &["--mapping", "light", "--technique-changes", "on"]] {
             let text = settings(given).unwrap_err();
-            assert!(text.starts_with("--technique-changes on: only chains"), "{text}");
+            assert!(text.contains("--technique-changes on: only chains"), "{text}");
         }
         assert!(settings(&["--technique-changes", "off"]).is_ok());
     }
