@@ -2,7 +2,7 @@
 //!
 //! Source: Kelemen et al. 2002; the paper's comparison renders with it in two passes.
 
-use super::{Evaluator, Recorder, Start, TECHNIQUE_CHANGES, Target, TechniqueChanges, Walkers, replay};
+use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
     path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -95,24 +95,19 @@ impl<W: Default> Baseline<W> {
 
     fn step<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
+        self.evaluator.counters.iter_mut().for_each(|counter| counter.step = self.steps);
+        if target.changes_techniques() {
+            self.change_techniques(target, unit, recorder);
+        }
         for lane in 0..self.decisions.len() {
-            self.evaluator.counters[lane].step = self.steps;
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
-            let [decision, kind, technique, _] = rng.words(counter, 0).map(open_unit_f64);
+            let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
             let large = kind < self.large_steps.probability;
             self.evaluator.moves[lane] = if large { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
-            if !large && target.changes_techniques() && technique < TECHNIQUE_CHANGES {
-                self.evaluator.change_technique(target, &self.walkers.points, lane, 1.0);
-            }
         }
         self.evaluator.evaluate(target, &self.walkers.points);
         for lane in 0..self.evaluator.moves.len() {
-            if self.evaluator.moves[lane] == Move::Rest {
-                self.walkers.stay(lane);
-                self.changed.stayed += 1;
-                continue;
-            }
             let proposed = self.evaluator.out.whole(lane);
             let small = self.evaluator.moves[lane] != Move::Fresh;
             if !small {
@@ -124,18 +119,25 @@ impl<W: Default> Baseline<W> {
             let u = self.decisions[lane];
             let large_steps = self.large_steps;
             let Evaluator { points, out, .. } = &self.evaluator;
-            let law = (1.0, self.evaluator.expected(lane));
-            let alpha = self.walkers.step_expecting(lane, law, (points, lane), out, u, &mut |state, weight| {
+            let alpha = self.walkers.step(lane, 1.0, (points, lane), out, u, &mut |state, weight| {
                 large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
             });
-            if self.evaluator.moves[lane] == Move::Given {
-                self.changed.count(alpha);
-                continue;
-            }
             let count = if small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
         }
         self.steps += 1;
+    }
+
+    /// Changes the techniques of some chains, before they step.
+    fn change_techniques<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
+        let (walkers, evaluator, large_steps) = (&mut self.walkers, &mut self.evaluator, self.large_steps);
+        evaluator.propose_changes(target, &walkers.points, self.decisions.len(), |_| 1.0);
+        for &lane in &evaluator.drawn {
+            let alpha = evaluator.settle_change(walkers, lane, 1.0, &mut |state, weight| {
+                large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
+            });
+            self.changed.count(alpha);
+        }
     }
 
     /// Records what the current states have gathered, without changing them.

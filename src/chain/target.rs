@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Importance;
 use crate::{
     path::{Contributions, Mapping, Workspace},
-    rng::{Counter, Purpose, Rng},
+    rng::{Counter, Rng},
     sample::{Block, Move, Points, Proposals},
 };
 
@@ -81,8 +81,10 @@ pub struct Evaluator<W> {
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
     /// The blocks of lanes whose techniques change, and the expected change of ln g.
-    given: Points,
-    expected: Vec<f64>,
+    pub(super) given: Points,
+    pub(super) expected: Vec<f64>,
+    /// Lanes that a change of technique was drawn for.
+    pub drawn: Vec<usize>,
     /// The proposed points.
     pub points: Points,
     /// What they contribute.
@@ -109,6 +111,7 @@ impl<W: Default> Evaluator<W> {
             counters,
             given: Points::new(lanes),
             expected: vec![0.0; lanes],
+            drawn: Vec::new(),
             points: Points::new(lanes),
             out: Contributions::new(lanes),
             workspace,
@@ -123,25 +126,6 @@ impl<W: Default> Evaluator<W> {
     /// The source of random words.
     pub fn rng(&self) -> Rng {
         self.rng
-    }
-
-    /// Makes a lane's next move a change of technique at that inverse temperature, or rest where there is nothing to change.
-    pub fn change_technique<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points, lane: usize, beta: f64) {
-        let counter = Counter { purpose: Purpose::Technique, ..self.counters[lane] };
-        let mut blocks = 0..u16::MAX;
-        let mut random = || self.rng.words(counter, blocks.next().expect("paths are shorter"));
-        let rays = &mut self.out.rays;
-        self.given.clear(lane);
-        let change = target.change_technique((current, lane), beta, &mut random, &mut self.given, rays);
-        self.moves[lane] = if change.is_some() { Move::Given } else { Move::Rest };
-        self.expected[lane] = change.unwrap_or(0.0);
-    }
-
-    /// The change of ln g that is expected of a lane's proposal, which acceptance is to discount: 0 but for changes of
-    /// technique.
-    #[inline(always)]
-    pub fn expected(&self, lane: usize) -> f64 {
-        if self.moves[lane] == Move::Given { self.expected[lane] } else { 0.0 }
     }
 
     /// Draws and evaluates a proposal in every lane that does not rest; small steps start at `current`.

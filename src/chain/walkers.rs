@@ -52,21 +52,7 @@ impl Walkers {
         u: f64,
         record: &mut impl FnMut(Whole, f64),
     ) -> f64 {
-        self.step_expecting(lane, (beta, 0.0), (points, from), proposed, u, record)
-    }
-
-    /// The same where ln g is expected to change by `expected`, which acceptance discounts.
-    #[inline(always)]
-    pub fn step_expecting(
-        &mut self,
-        lane: usize,
-        (beta, expected): (f64, f64),
-        (points, from): (&Points, usize),
-        proposed: &Contributions,
-        u: f64,
-        record: &mut impl FnMut(Whole, f64),
-    ) -> f64 {
-        let alpha = acceptance(beta, self.states[lane].ln_g + expected, proposed.lanes[from].ln_g);
+        let alpha = acceptance(beta, self.states[lane].ln_g, proposed.lanes[from].ln_g);
         self.pending[lane] += 1.0 - alpha;
         if u < alpha {
             self.replace(lane, (points, from), proposed, record);
@@ -75,12 +61,6 @@ impl Walkers {
             record(proposed.whole(from), alpha);
         }
         alpha
-    }
-
-    /// A step that leads nowhere else.
-    #[inline(always)]
-    pub fn stay(&mut self, lane: usize) {
-        self.pending[lane] += 1.0;
     }
 
     /// Puts a chain into lane `from` of those points and of what they contribute, with no weight yet; the old state is

@@ -12,7 +12,7 @@ use super::{
     trips::{IndexProcess, Trips},
 };
 use crate::{
-    chain::{Evaluator, Importance, Start, TECHNIQUE_CHANGES, Target, Walkers, replay},
+    chain::{Evaluator, Importance, Start, Target, Walkers, replay},
     path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
@@ -379,17 +379,17 @@ impl<W: Default> Part<W> {
     ) {
         let rng = self.evaluator.rng();
         self.evaluator.counters.iter_mut().for_each(|counter| counter.step = sweep);
+        if target.changes_techniques() {
+            self.change_techniques(target, canvas, round, rung);
+        }
         self.evaluator.moves[self.replicas..].fill(Move::Fresh);
         for at in 0..self.replicas {
             let k = usize::from(rung[self.lanes.start + at]);
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
-            let [decision, choice, technique, _] = rng.words(counter, 0);
+            let [decision, choice, ..] = rng.words(counter, 0);
             self.decision[at] = decision;
             self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
             self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);
-            if target.changes_techniques() && open_unit_f64(technique) < TECHNIQUE_CHANGES {
-                self.evaluator.change_technique(target, &self.walkers.points, at, round.ladder.betas()[k]);
-            }
         }
         self.evaluator.evaluate(target, &self.walkers.points);
 
@@ -398,32 +398,40 @@ impl<W: Default> Part<W> {
         for at in 0..self.replicas {
             let k = usize::from(rung[self.lanes.start + at]);
             let beta = round.ladder.betas()[k];
-            match evaluator.moves[at] {
-                Move::Rest => {
-                    walkers.stay(at);
-                    tally.counts[k].changes.stayed += 1;
-                }
-                how => {
-                    let u = open_unit_f64(self.decision[at]);
-                    let law = (beta, evaluator.expected(at));
-                    let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
-                    let proposed = (&evaluator.points, at);
-                    let alpha = walkers.step_expecting(at, law, proposed, &evaluator.out, u, &mut record);
-                    let counts = &mut tally.counts[k];
-                    if how == Move::Given {
-                        counts.changes.count(alpha);
-                    } else {
-                        counts.steps[usize::from(self.scale[at])].add(alpha);
-                        self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
-                        counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
-                    }
-                }
-            }
-            let [sum, weight] = &mut tally.counts[k].halves[half];
+            let u = open_unit_f64(self.decision[at]);
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = walkers.step(at, beta, (&evaluator.points, at), &evaluator.out, u, &mut record);
+            let counts = &mut tally.counts[k];
+            counts.steps[usize::from(self.scale[at])].add(alpha);
+            let [sum, weight] = &mut counts.halves[half];
             (*sum, *weight) = (*sum + walkers.states[at].ln_g, *weight + 1.0);
+            self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
+            counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
         for at in self.replicas..evaluator.out.lanes.len() {
             tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
+        }
+    }
+
+    /// Changes of technique of some replicas, before they step: states and weights of the sweep are those that steps lead
+    /// to, so this costs evaluations and no weight.
+    fn change_techniques<T: Target<Workspace = W>>(
+        &mut self,
+        target: &T,
+        canvas: &Canvas,
+        round: &Round,
+        rung: &[u16],
+    ) {
+        let Part { walkers, evaluator, tally, lanes, replicas, .. } = self;
+        let rung_of = |at: usize| usize::from(rung[lanes.start + at]);
+        let beta_of = |at: usize| round.ladder.betas()[rung_of(at)];
+        evaluator.propose_changes(target, &walkers.points, *replicas, beta_of);
+        for i in 0..evaluator.drawn.len() {
+            let at = evaluator.drawn[i];
+            let k = rung_of(at);
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = evaluator.settle_change(walkers, at, beta_of(at), &mut record);
+            tally.counts[k].changes.count(alpha);
         }
     }
 }

@@ -179,11 +179,12 @@ fn stay(name: &str, mapping: &Mapping, beta: f64) {
                 }
                 evaluator.evaluate(mapping, &walkers.points);
                 for &lane in lit.iter().filter(|lane| evaluator.moves[**lane] != Move::Rest) {
-                    let (law, from) = ((beta, evaluator.expected(lane)), (&evaluator.points, lane));
-                    let out = &evaluator.out;
-                    let alpha = walkers.step_expecting(lane, law, from, out, decisions[lane][0], &mut |_, _| {});
                     if evaluator.moves[lane] == Move::Given {
-                        (changed, proposed) = (changed + alpha, proposed + 1);
+                        let alpha = evaluator.settle_change(&mut walkers, lane, beta, &mut |_, _| {});
+                        (changed, proposed) = (changed + alpha.expect("a change"), proposed + 1);
+                    } else {
+                        let (from, u) = ((&evaluator.points, lane), decisions[lane][0]);
+                        walkers.step(lane, beta, from, &evaluator.out, u, &mut |_, _| {});
                     }
                 }
             }

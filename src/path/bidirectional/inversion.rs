@@ -38,14 +38,14 @@ use glam::Vec3;
 use super::subpath::Site;
 use crate::{
     embree::MISS,
-    math::offset_origin,
+    math::{Frame, offset_origin},
     path::Mapping,
     rng::{open_unit_f64, unit_f32, word_of_unit},
     sample::{Block, Points},
     scene::{
-        FullProfile, NO_LIGHT, Scene, Sight, Surface,
+        FullProfile, Mixture, NO_LIGHT, Scattering, ScatteringRef, Scene, Sight, Surface,
         lights::{EmissionInverse, EmitterKind, SHORT_OF_LIGHT},
-        materials::Inverse,
+        materials::{Inverse, Material},
     },
 };
 /// Any scene's; paths are few, so that it does not pay to have one for each kernel.
@@ -87,11 +87,38 @@ struct Path<'s> {
     light: usize,
     start: Start,
     /// x₁ … x_{n−1}.
-    inner: Vec<Surface<'s>>,
+    inner: Vec<Vertex<'s>>,
     lens: [f32; 2],
     /// Its edges, from x₀ on.
     edges: Vec<Edge>,
     sight: Option<Sight>,
+}
+
+/// What is kept of a [`Surface`].
+struct Vertex<'s> {
+    p: Vec3,
+    ng: Vec3,
+    lift: Vec3,
+    frame: Frame,
+    wo: Vec3,
+    scattering: Kept<'s>,
+}
+
+/// A scattering function; mixtures are large, and few.
+enum Kept<'s> {
+    Plain(&'s Material),
+    Mixed(Box<Mixture>),
+}
+
+impl<'s> From<Surface<'s>> for Vertex<'s> {
+    fn from(surface: Surface<'s>) -> Vertex<'s> {
+        let Surface { p, ng, lift, frame, wo, scattering, .. } = surface;
+        let scattering = match scattering {
+            Scattering::Plain(material) => Kept::Plain(material),
+            Scattering::Mixed(mixture) => Kept::Mixed(Box::new(mixture)),
+        };
+        Vertex { p, ng, lift, frame, wo, scattering }
+    }
 }
 
 /// What leads from one vertex to the next.
@@ -190,7 +217,7 @@ impl<'a> Old<'a> {
                 let [a, b, lobe, _] = self.block(layout.light_bounce(j as u16 - 1))?.map(unit_f32);
                 ray = scattered(&surface, [a, b], lobe)?;
             }
-            path.inner.push(surface);
+            path.inner.push(surface.into());
         }
         Some(())
     }
@@ -220,13 +247,13 @@ impl<'a> Old<'a> {
                 let (origin, direction) = scattered(&surface, [a, b], unit_f32(lobe))?;
                 ray = (origin, direction, f32::MAX);
             }
-            path.inner.push(surface);
+            path.inner.push(surface.into());
         }
         Some(())
     }
 
     /// The place on a light that next-event estimation finds.
-    fn looked_for(&self, from: &Surface, place: [f32; 2], choice: f32) -> Option<Start> {
+    fn looked_for(&self, from: &Vertex, place: [f32; 2], choice: f32) -> Option<Start> {
         let emitters = &self.mapping.scene().emitters;
         let found = emitters.sample::<P>(from.p, from.lift, place, choice)?;
         let kind = emitters.kind(found.light);
@@ -270,7 +297,7 @@ impl<'a> Old<'a> {
                 let inverse = path.invert(at, Way::ToLight)?;
                 (block, choices[0]) = shaped(&inverse, block, choices[0]);
             } else if s == 1 {
-                let Surface { p, lift, .. } = path.inner[at - 1];
+                let Vertex { p, lift, .. } = path.inner[at - 1];
                 if let Some([a, b]) = light.invert_sample(p, lift, start.place, start.triangle)? {
                     (block[2], block[3]) = (word_of_unit(a, block[2]), word_of_unit(b, block[3]));
                 }
@@ -375,7 +402,12 @@ impl Path<'_> {
 
     /// x_i, 0 < i < n.
     fn site(&self, i: usize) -> Site<'_> {
-        Site::of(&self.inner[i - 1])
+        let &Vertex { p, ng, lift, frame, wo, ref scattering } = &self.inner[i - 1];
+        let scattering = match scattering {
+            Kept::Plain(material) => ScatteringRef::Plain(material),
+            Kept::Mixed(mixture) => ScatteringRef::Mixed(mixture),
+        };
+        Site { p, ng, lift, frame, wo, scattering }
     }
 
     /// Finds its edges, and how the camera sees it; `None` where it does not.
@@ -430,7 +462,7 @@ impl Path<'_> {
     fn is_invertible(&self, i: usize) -> bool {
         /// Shading normals lean by no more than rounding.
         const UPRIGHT: f32 = 1.0 - 1e-5;
-        let upright = |surface: &Surface| surface.ng.dot(surface.frame.n).abs() > UPRIGHT;
+        let upright = |vertex: &Vertex| vertex.ng.dot(vertex.frame.n).abs() > UPRIGHT;
         (self.is_smooth(i) || upright(&self.inner[i - 1]))
             && [Way::ToLight, Way::ToCamera].iter().all(|way| self.invert(i, *way).is_some())
     }
@@ -444,23 +476,29 @@ impl Path<'_> {
     /// Whether the light may be found by either subpath and by next-event estimation.
     fn is_light_invertible(&self, scene: &Scene) -> bool {
         let Start { light, place, triangle, .. } = self.start;
-        let Surface { p, lift, .. } = self.inner[0];
+        let Vertex { p, lift, .. } = self.inner[0];
         self.emission(scene).is_some() && scene.emitters.light(light).invert_sample(p, lift, place, triangle).is_some()
     }
 
     /// All techniques that are exchanged with the present one, which is among them.
     fn techniques(&self, scene: &Scene) -> Vec<Technique> {
         let n = self.length();
+        let invertible: Vec<bool> =
+            (0..n).map(|i| if i == 0 { self.is_light_invertible(scene) } else { self.is_invertible(i) }).collect();
+        let exchange = |s: usize| {
+            let around = &invertible[s.saturating_sub(1)..=(s + 1).min(n - 1)];
+            if around.contains(&false) { None } else { self.exchange(scene, s) }
+        };
         let mut all = vec![Technique { light: self.light, ln_density: 0.0, ln_weighed: 0.0 }];
         let (mut ln_density, mut ln_weighed) = (0.0, 0.0);
         for s in self.light..n {
-            let Some([density, weighed]) = self.exchange(scene, s) else { break };
+            let Some([density, weighed]) = exchange(s) else { break };
             (ln_density, ln_weighed) = (ln_density + density, ln_weighed + weighed);
             all.push(Technique { light: s + 1, ln_density, ln_weighed });
         }
         (ln_density, ln_weighed) = (0.0, 0.0);
         for s in (0..self.light).rev() {
-            let Some([density, weighed]) = self.exchange(scene, s) else { break };
+            let Some([density, weighed]) = exchange(s) else { break };
             (ln_density, ln_weighed) = (ln_density - density, ln_weighed - weighed);
             all.push(Technique { light: s, ln_density, ln_weighed });
         }
@@ -478,14 +516,9 @@ impl Path<'_> {
         }
     }
 
-    /// ln (p_{s+1}/p_s) and ln (π_{s+1}/π_s), of x_s that comes from the light or from the camera; `None` where these two
-    /// techniques are not exchanged.
+    /// ln (p_{s+1}/p_s) and ln (π_{s+1}/π_s), of x_s that comes from the light or from the camera; `None` where either does
+    /// not.
     fn exchange(&self, scene: &Scene, s: usize) -> Option<[f64; 2]> {
-        let n = self.length();
-        let invertible = (s.max(2) - 1..=(s + 1).min(n - 1)).all(|i| self.is_invertible(i));
-        if !invertible || s < 2 && !self.is_light_invertible(scene) {
-            return None;
-        }
         let (light, camera) = (self.from_light(scene, s), self.from_camera(s)?);
         let ratio = [0, 1].map(|i| light[i] - camera[i]);
         ratio.iter().all(|ratio| ratio.is_finite()).then_some(ratio)
