@@ -80,9 +80,10 @@ pub struct Evaluator<W> {
     pub film: [u32; 2],
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
-    /// The blocks of lanes whose techniques change, and the expected change of ln g.
+    /// The blocks of lanes whose techniques change.
     pub(super) given: Points,
-    pub(super) expected: Vec<f64>,
+    /// The change of ln g that is expected of each lane's last change of technique.
+    pub expected: Vec<f64>,
     /// Lanes that a change of technique was drawn for.
     pub drawn: Vec<usize>,
     /// The proposed points.

@@ -90,7 +90,7 @@ fn another_technique_contributes_at_the_same_place_what_densities_say() {
             for lane in lit.into_iter().filter(|lane| evaluator.moves[*lane] == Move::Given) {
                 all += 1;
                 let change = evaluator.out.lanes[lane].ln_g - walkers.states[lane].ln_g;
-                let error = (change - evaluator.expected(lane)).abs();
+                let error = (change - evaluator.expected[lane]).abs();
                 let moved = if evaluator.out.lanes[lane].is_dark() {
                     1.0
                 } else {
@@ -103,11 +103,7 @@ fn another_technique_contributes_at_the_same_place_what_densities_say() {
                     let [from, to] = [&walkers.points, &evaluator.points].map(|p| technique(&mapping, p, lane));
                     worst.push(format!(
                         "({}, {}) to ({}, {}): {change} for {}, moved by {moved}",
-                        from.light,
-                        from.camera,
-                        to.light,
-                        to.camera,
-                        evaluator.expected(lane)
+                        from.light, from.camera, to.light, to.camera, evaluator.expected[lane]
                     ));
                 }
             }

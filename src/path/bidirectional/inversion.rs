@@ -519,14 +519,14 @@ impl Path<'_> {
     /// ln (p_{s+1}/p_s) and ln (π_{s+1}/π_s), of x_s that comes from the light or from the camera; `None` where either does
     /// not.
     fn exchange(&self, scene: &Scene, s: usize) -> Option<[f64; 2]> {
-        let (light, camera) = (self.from_light(scene, s), self.from_camera(s)?);
+        let (light, camera) = (self.ln_from_light(scene, s), self.ln_from_camera(s)?);
         let ratio = [0, 1].map(|i| light[i] - camera[i]);
         ratio.iter().all(|ratio| ratio.is_finite()).then_some(ratio)
     }
 
     /// ln of the two densities of x_s per area when it comes from the light; of x₁ with what else changes when
     /// next-event estimation gives way to light subpaths.
-    fn from_light(&self, scene: &Scene, s: usize) -> [f64; 2] {
+    fn ln_from_light(&self, scene: &Scene, s: usize) -> [f64; 2] {
         let Start { light, place, normals, .. } = self.start;
         let edge = &self.edges[s.max(1) - 1];
         let [place_density, rest] = scene.emitters.emission_pdf::<P>(light, normals, self.edges[0].directions[0]);
@@ -551,7 +551,7 @@ impl Path<'_> {
     }
 
     /// ln of the two densities of x_s per area when it comes from the camera.
-    fn from_camera(&self, s: usize) -> Option<[f64; 2]> {
+    fn ln_from_camera(&self, s: usize) -> Option<[f64; 2]> {
         if s + 1 == self.length() {
             return Some([(f64::from(self.sight?.density) * self.cos(s, Way::ToCamera)).ln(); 2]);
         }
