@@ -14,13 +14,13 @@ use crate::{
 
 /// Probability that a chain changes its technique before a step, where the target has any.
 ///
-/// What that brings and costs on the multiplexed mapping, 32 mutations per pixel of 256 × 256, medians of two or three
-/// seeds, one thread, as relMSE without / with, and processor time with by that without:
+/// What that brings and costs on the multiplexed mapping: relMSE without / with at 32 mutations per pixel of 256 × 256,
+/// medians of three seeds, and how much more processor time a mutation takes:
 ///
 /// | | `cornell-box` | `caustic` | `lattice` |
 /// |---|---|---|---|
-/// | `mlt` | 0.0623 / 0.0580, × 1.45 | 0.099 / 0.092, × 1.5 | 0.73 / 0.63, × 1.8 |
-/// | `re`, K = 3 | 0.0519 / 0.0512, × 1.2 | 0.139 / 0.138, × 1.3 | 0.83 / 0.81, × 1.5 |
+/// | `mlt` | 0.062 / 0.058, × 1.4 | 0.092 / 0.088, × 1.6 | 0.82 / 0.68, × 1.9 |
+/// | `re`, K = 3 | 0.052 / 0.051, × 1.3 | 0.129 / 0.137, × 1.25 | 0.86 / 0.78, × 1.5 |
 ///
 /// At equal time that loses, so runs do it only where asked to. In the place of steps instead of beside them, chains lost
 /// a third at equal numbers of steps too: a path that stays where it is lights no other pixel.
