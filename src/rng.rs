@@ -29,6 +29,8 @@ pub enum Purpose {
     Pass = 8,
     /// Points that mappings are tried with.
     Trial = 9,
+    /// Changes of technique.
+    Technique = 10,
 }
 
 /// Identifies one call for four random words.
@@ -116,6 +118,12 @@ pub fn unit_f32(word: u32) -> f32 {
     (word >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// A word for which [`unit_f32`] is the nearest to `u`, a number in [0, 1]; the rest of the word is that of `rest`.
+pub fn word_of_unit(u: f32, rest: u32) -> u32 {
+    let steps = (f64::from(u) * 16_777_216.0 + 0.5) as u32; // negative numbers and NaN become 0
+    (steps.min((1 << 24) - 1) << 8) | (rest & 0xff)
+}
+
 /// Uniform number in (0, 1) from 32 random bits; never 0, so that its logarithm is finite.
 #[inline(always)]
 pub fn open_unit_f64(word: u32) -> f64 {
@@ -170,6 +178,14 @@ mod tests {
         assert_ne!(words, rng.words(Counter { purpose: Purpose::Step, ..base }, 4));
         assert_ne!(words, rng.words(base, 5));
         assert_ne!(words, Rng::new(8).words(base, 4));
+    }
+
+    #[test]
+    fn words_of_units_are_read_as_those() {
+        for word in [0, 255, 256, 0x1234_5678, u32::MAX - 256, u32::MAX] {
+            assert_eq!(word_of_unit(unit_f32(word), word), word);
+        }
+        assert_eq!(word_of_unit(1.0, 0), 0xffff_ff00);
     }
 
     #[test]

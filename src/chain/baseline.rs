@@ -2,7 +2,7 @@
 //!
 //! Source: Kelemen et al. 2002; the paper's comparison renders with it in two passes.
 
-use super::{Evaluator, Recorder, Start, Target, Walkers, replay};
+use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
     path::Whole,
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -48,6 +48,8 @@ pub struct Baseline<W> {
     /// Uniform number of each lane's decision at this step.
     decisions: Vec<f64>,
     steps: u64,
+    /// Changes of technique.
+    pub changed: TechniqueChanges,
     /// Σ of acceptance probabilities of small steps and how many there were.
     pub small: (f64, u64),
     /// The same of large steps.
@@ -76,6 +78,7 @@ impl<W: Default> Baseline<W> {
             evaluator,
             large_steps,
             decisions: vec![0.0; starts.len()],
+            changed: TechniqueChanges::default(),
             steps: 0,
             small: (0.0, 0),
             large: (0.0, 0),
@@ -92,8 +95,11 @@ impl<W: Default> Baseline<W> {
 
     fn step<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
+        self.evaluator.counters.iter_mut().for_each(|counter| counter.step = self.steps);
+        if target.changes_techniques() {
+            self.change_techniques(target, unit, recorder);
+        }
         for lane in 0..self.decisions.len() {
-            self.evaluator.counters[lane].step = self.steps;
             let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
             let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
@@ -120,6 +126,18 @@ impl<W: Default> Baseline<W> {
             *count = (count.0 + alpha, count.1 + 1);
         }
         self.steps += 1;
+    }
+
+    /// Changes the techniques of some chains, before they step.
+    fn change_techniques<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
+        let (walkers, evaluator, large_steps) = (&mut self.walkers, &mut self.evaluator, self.large_steps);
+        evaluator.propose_changes(target, &walkers.points, self.decisions.len(), |_| 1.0);
+        for &lane in &evaluator.drawn {
+            let alpha = evaluator.settle_change(walkers, lane, 1.0, &mut |state, weight| {
+                large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
+            });
+            self.changed.count(alpha);
+        }
     }
 
     /// Records what the current states have gathered, without changing them.

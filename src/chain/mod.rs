@@ -1,6 +1,7 @@
 //! The Metropolis process: acceptance, states of many chains, and the baseline that knows no temperatures.
 
 mod baseline;
+mod changes;
 mod importance;
 mod metropolis;
 mod plan;
@@ -10,6 +11,7 @@ mod target;
 mod walkers;
 
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, baseline_layer};
+pub use changes::{TECHNIQUE_CHANGES, TechniqueChanges};
 pub use importance::{Importance, Measure};
 pub use metropolis::acceptance;
 pub use plan::{FEWEST_BLOCKS, Plan};

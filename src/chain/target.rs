@@ -6,7 +6,7 @@ use super::Importance;
 use crate::{
     path::{Contributions, Mapping, Workspace},
     rng::{Counter, Rng},
-    sample::{Move, Points, Proposals},
+    sample::{Block, Move, Points, Proposals},
 };
 
 /// A non-negative function on the unit cube, evaluated for a batch of points at a time.
@@ -19,6 +19,25 @@ pub trait Target: Sync {
     /// Evaluates the proposals of all lanes that do not rest, drawing the blocks it needs.
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace);
 
+    /// Whether chains are to take [`change_technique`](Target::change_technique) for some of their steps.
+    fn changes_techniques(&self) -> bool {
+        false
+    }
+
+    /// Draws another way to say what the point of a lane says, whose blocks go to the same lane of `to`: a step that leaves
+    /// the distribution g^β unchanged if accepted with min(1, (g′/g · e^−Δ)^β), Δ the returned expected change of ln g.
+    /// `None`: the chain stays where it is. `random` gives uniform blocks, `rays` counts those traced.
+    fn change_technique(
+        &self,
+        _current: (&Points, usize),
+        _beta: f64,
+        _random: &mut dyn FnMut() -> Block,
+        _to: &mut Points,
+        _rays: &mut u64,
+    ) -> Option<f64> {
+        None
+    }
+
     /// Whether points may contribute elsewhere than at their own film positions.
     fn splats_elsewhere(&self) -> bool {
         false
@@ -30,6 +49,21 @@ impl Target for Mapping<'_> {
 
     fn splats_elsewhere(&self) -> bool {
         self.kind().splats_elsewhere()
+    }
+
+    fn changes_techniques(&self) -> bool {
+        self.technique_changes()
+    }
+
+    fn change_technique(
+        &self,
+        current: (&Points, usize),
+        beta: f64,
+        random: &mut dyn FnMut() -> Block,
+        to: &mut Points,
+        rays: &mut u64,
+    ) -> Option<f64> {
+        Mapping::change_technique(self, current, beta, random, to, rays)
     }
 
     fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
@@ -46,6 +80,12 @@ pub struct Evaluator<W> {
     pub film: [u32; 2],
     /// Which words each lane draws next.
     pub counters: Vec<Counter>,
+    /// The blocks of lanes whose techniques change.
+    pub(super) given: Points,
+    /// The change of ln g that is expected of each lane's last change of technique.
+    pub expected: Vec<f64>,
+    /// Lanes that a change of technique was drawn for.
+    pub drawn: Vec<usize>,
     /// The proposed points.
     pub points: Points,
     /// What they contribute.
@@ -70,6 +110,9 @@ impl<W: Default> Evaluator<W> {
             film: [1, 1],
             importance: None,
             counters,
+            given: Points::new(lanes),
+            expected: vec![0.0; lanes],
+            drawn: Vec::new(),
             points: Points::new(lanes),
             out: Contributions::new(lanes),
             workspace,
@@ -91,6 +134,7 @@ impl<W: Default> Evaluator<W> {
         let mut proposals = Proposals {
             rng: self.rng,
             current,
+            given: &self.given,
             points: &mut self.points,
             counters: &self.counters,
             moves: &self.moves,

@@ -11,6 +11,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::scene::SceneArguments;
 use super::{signals, values};
+use crate::path::MappingKind;
 use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
@@ -62,6 +63,10 @@ pub(super) struct Render {
     /// those ways for each mutation; auto: a short trial on the scene decides
     #[arg(long, value_name = "HOW", default_value = "auto", value_parser = values::mapping(), help_heading = "Method")]
     mapping: MappingChoice,
+
+    /// Lets chains on --mapping multiplexed change the technique of a path and keep the path [default: off]
+    #[arg(long, value_name = "WHETHER", value_parser = values::switch(), help_heading = "Method")]
+    technique_changes: Option<bool>,
 
     /// Inverse temperatures for --method re in place of --replicas, rising from 0 to 1, such as 0,0.3,1
     #[arg(long, value_name = "0,…,1", value_delimiter = ',', allow_negative_numbers = true, help_heading = "Method")]
@@ -180,6 +185,7 @@ impl Render {
             uniform_share: self.uniform_share,
             measure: self.error.unwrap_or_default(),
             layers: self.layers,
+            technique_changes: self.technique_changes.unwrap_or(Settings::default().technique_changes),
             mlt: MltSettings {
                 large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
                 normalisation: self.normalisation.unwrap_or_default(),
@@ -214,6 +220,13 @@ impl Render {
             let method = self.method.name();
             let given = of_a_ladder.iter().filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
+        }
+        let multiplexed = self.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
+        if self.technique_changes == Some(true) && !(multiplexed && self.method != Method::Path) {
+            faults.push(
+                "--technique-changes on: only chains of --method mlt or re on --mapping multiplexed have a technique to change"
+                    .into(),
+            );
         }
         let of_large_steps = [
             ("--large-steps", self.large_steps.is_some()),
@@ -367,6 +380,7 @@ mod tests {
             uniform_share: Some(0.25),
             measure: Measure::Absolute,
             layers: true,
+            technique_changes: false,
             mlt: MltSettings::default(),
             packet: PacketChoice::Auto,
         };
@@ -376,6 +390,8 @@ mod tests {
         let given = "--method mlt --large-steps 0.5 --normalisation pooled --kelemen-weights";
         let expected = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
         assert_eq!(settings(&given.split(' ').collect::<Vec<_>>()).unwrap().mlt, expected);
+        let given = ["--mapping", "multiplexed", "--technique-changes", "on"];
+        assert!(settings(&given).unwrap().technique_changes);
         assert_eq!(settings(&["--replicas", "6"]).unwrap().ladder, LadderChoice::Replicas(6));
         assert_eq!(settings(&["--replicas", "auto"]).unwrap().ladder, LadderChoice::Auto);
     }
@@ -392,6 +408,15 @@ mod tests {
             assert!(text.contains(part), "{part:?} is not in:\n{text}");
         }
         assert_eq!(text.lines().count(), 4, "{text}");
+    }
+
+    #[test]
+    fn only_chains_that_have_techniques_change_them() {
+        for given in [&["--technique-changes", "on"][..], &["--mapping", "light", "--technique-changes", "on"]] {
+            let text = settings(given).unwrap_err();
+            assert!(text.contains("--technique-changes on: only chains"), "{text}");
+        }
+        assert!(settings(&["--technique-changes", "off"]).is_ok());
     }
 
     #[test]

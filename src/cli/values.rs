@@ -66,6 +66,11 @@ pub(super) fn normalisation() -> impl TypedValueParser<Value = Normalisation> {
     one_of(&Normalisation::ALL, |normalisation| normalisation.name())
 }
 
+/// Off or on.
+pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
+    one_of(&[false, true], |on| if *on { "on" } else { "off" })
+}
+
 pub(super) fn packet() -> impl TypedValueParser<Value = PacketChoice> {
     static ALL: [PacketChoice; 5] = [
         PacketChoice::Auto,

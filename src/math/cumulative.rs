@@ -48,6 +48,11 @@ impl Cumulative {
         self.ends[i] - self.start(i)
     }
 
+    /// The numbers for which [`choose`](Cumulative::choose) gives number `i`: from the first to before the second.
+    pub fn range(&self, i: usize) -> [f32; 2] {
+        [self.start(i), self.ends[i]]
+    }
+
     #[inline(always)]
     fn start(&self, i: usize) -> f32 {
         if i == 0 { 0.0 } else { self.ends[i - 1] }

@@ -24,11 +24,33 @@ pub fn disk(u: [f32; 2]) -> Vec2 {
     Vec2::new(r * c, r * s)
 }
 
+/// The inverse of [`disk`].
+pub fn from_disk(d: Vec2) -> [f32; 2] {
+    let [x, y] = [d.x, d.y].map(f64::from);
+    let (r, eighths) = (x.hypot(y), 8.0 / std::f64::consts::TAU);
+    if r == 0.0 {
+        return [0.5; 2];
+    }
+    let (a, b) = if x.abs() > y.abs() {
+        let a = r.copysign(x);
+        (a, a * eighths * libm::atan(y / x))
+    } else {
+        let b = r.copysign(y);
+        (b * eighths * libm::atan(x / y), b)
+    };
+    [a, b].map(|side| (0.5 * (side + 1.0)) as f32)
+}
+
 /// The upper hemisphere with density cos θ/π (Malley's method over [`disk`]).
 #[inline(always)]
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let d = disk(u);
     Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// The inverse of [`cosine_hemisphere`].
+pub fn from_cosine_hemisphere(w: Vec3) -> [f32; 2] {
+    from_disk(w.truncate())
 }
 
 /// Density of [`cosine_hemisphere`] with respect to solid angle.
@@ -46,6 +68,17 @@ pub fn sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(r * c, r * s, z)
 }
 
+/// The inverse of [`sphere`].
+pub fn from_sphere(w: Vec3) -> [f32; 2] {
+    [turn_of(w.x, w.y), 0.5 - 0.5 * w.z]
+}
+
+/// The angle of a point about the origin, in turns within [0, 1].
+pub fn turn_of(x: f32, y: f32) -> f32 {
+    let turn = libm::atan2(f64::from(y), f64::from(x)) / std::f64::consts::TAU;
+    (if turn < 0.0 { turn + 1.0 } else { turn }) as f32
+}
+
 /// Directions within the angle of a cone about +z; density 1/(2π(1 − cos θ_max)). Given 1 − cos θ_max rather than
 /// the cosine, which loses all digits for small cones.
 #[inline(always)]
@@ -56,11 +89,23 @@ pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     Vec3::new(r * c, r * s, 1.0 - d)
 }
 
+/// The inverse of [`cone`].
+pub fn from_cone(w: Vec3, one_minus_cos_max: f32) -> [f32; 2] {
+    let one_minus_cos = (w.x * w.x + w.y * w.y) / (1.0 + w.z); // 1 − z would have no digits in small cones
+    [turn_of(w.x, w.y), one_minus_cos / one_minus_cos_max]
+}
+
 /// Barycentric coordinates (of the second and third corner) uniform over a triangle; density 1/area.
 #[inline(always)]
 pub fn triangle(u: [f32; 2]) -> [f32; 2] {
     let r = (1.0 - u[0]).max(0.0).sqrt();
     [1.0 - r, u[1] * r]
+}
+
+/// The inverse of [`triangle`].
+pub fn from_triangle([b, c]: [f32; 2]) -> [f32; 2] {
+    let r = 1.0 - b;
+    [1.0 - r * r, if r > 0.0 { c / r } else { 0.5 }]
 }
 
 #[cfg(test)]
@@ -94,20 +139,16 @@ mod tests {
         })
     }
 
-    fn turn(x: f32, y: f32) -> f32 {
-        (y.atan2(x) / std::f32::consts::TAU).rem_euclid(1.0)
-    }
-
     #[test]
     fn warps_have_the_densities_they_state() {
         // each domain is mapped back to a square by the integral of its density: uniform if that is the density
-        assert_uniform("disk", squares().map(disk).map(|d| [turn(d.x, d.y), d.length_squared()]));
+        assert_uniform("disk", squares().map(disk).map(|d| [turn_of(d.x, d.y), d.length_squared()]));
         assert_uniform(
             "cosine_hemisphere",
-            squares().map(cosine_hemisphere).map(|w| [turn(w.x, w.y), 1.0 - w.z * w.z]),
+            squares().map(cosine_hemisphere).map(|w| [turn_of(w.x, w.y), 1.0 - w.z * w.z]),
         );
-        assert_uniform("sphere", squares().map(sphere).map(|w| [turn(w.x, w.y), 0.5 - 0.5 * w.z]));
-        assert_uniform("cone", squares().map(|u| cone(u, 0.3)).map(|w| [turn(w.x, w.y), (1.0 - w.z) / 0.3]));
+        assert_uniform("sphere", squares().map(sphere).map(|w| [turn_of(w.x, w.y), 0.5 - 0.5 * w.z]));
+        assert_uniform("cone", squares().map(|u| cone(u, 0.3)).map(|w| [turn_of(w.x, w.y), (1.0 - w.z) / 0.3]));
         assert_uniform(
             "triangle",
             squares().map(triangle).map(|[b, c]| [1.0 - (1.0 - b) * (1.0 - b), c / (1.0 - b).max(1e-9)]),
@@ -120,6 +161,33 @@ mod tests {
             for w in [cosine_hemisphere(u), sphere(u), cone(u, 1e-4)] {
                 assert!((w.length() - 1.0).abs() < 1e-5, "{w} from {u:?}");
             }
+        }
+    }
+
+    /// Up to what f32 keeps: where a map crushes the square, only what it makes of the numbers is compared.
+    #[test]
+    fn inverses_give_back_what_was_mapped() {
+        for u in squares().take(65536) {
+            let near = |name: &str, back: [f32; 2], bound: f32| {
+                let apart = |i: usize| (back[i] - u[i]).abs().min(1.0 - (back[i] - u[i]).abs());
+                assert!(apart(0).max(apart(1)) < bound, "{name}: {back:?} for {u:?}");
+            };
+            let far = |v: Vec2| v.length() > 0.05;
+            near("disk", from_disk(disk(u)), 1e-6);
+            near("cosine_hemisphere", from_cosine_hemisphere(cosine_hemisphere(u)), 1e-6);
+            let (w, v, b) = (sphere(u), cone(u, 1e-4), triangle(u));
+            if far(w.truncate()) {
+                near("sphere", from_sphere(w), 1e-5);
+            }
+            if u[1] > 1e-3 {
+                near("cone", from_cone(v, 1e-4), 2e-5);
+            }
+            if b[0] < 0.95 {
+                near("triangle", from_triangle(b), 1e-5);
+            }
+            assert!((sphere(from_sphere(w)) - w).length() < 2e-6, "{u:?}");
+            let [b2, c2] = triangle(from_triangle(b));
+            assert!((b2 - b[0]).abs() + (c2 - b[1]).abs() < 1e-6, "{u:?}");
         }
     }
 

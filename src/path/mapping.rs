@@ -9,7 +9,7 @@ use super::{
     unidirectional,
 };
 use crate::{
-    sample::Proposals,
+    sample::{Block, Points, Proposals},
     scene::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile, Scene},
 };
 
@@ -90,6 +90,7 @@ pub struct Mapping<'s> {
     widths: Widths,
     /// How points of the multiplexed mapping choose.
     lengths: Lengths,
+    technique_changes: bool,
     evaluate: Evaluate,
 }
 
@@ -134,7 +135,15 @@ impl<'s> Mapping<'s> {
             Kernel::Full => evaluate::<FullProfile>(kind),
         };
         let layout = Layout::new(&scene.features, kind == MappingKind::Multiplexed);
-        Mapping { scene, kind, lengths: Lengths::unknown(layout.max_depth()), layout, widths, evaluate }
+        Mapping {
+            scene,
+            kind,
+            lengths: Lengths::unknown(layout.max_depth()),
+            layout,
+            widths,
+            technique_changes: false,
+            evaluate,
+        }
     }
 
     /// The scene.
@@ -160,6 +169,32 @@ impl<'s> Mapping<'s> {
     /// Packet widths.
     pub fn widths(&self) -> Widths {
         self.widths
+    }
+
+    /// Another technique for the path of a lane's point: see [`bidirectional`](super::bidirectional) for the law, at inverse
+    /// temperature `beta`. The blocks of which it decides go to the same lane of `to`. The expected change of ln g; `None`
+    /// where the technique is to stay.
+    pub fn change_technique(
+        &self,
+        current: (&Points, usize),
+        beta: f64,
+        random: &mut dyn FnMut() -> Block,
+        to: &mut Points,
+        rays: &mut u64,
+    ) -> Option<f64> {
+        assert!(self.kind == MappingKind::Multiplexed, "points of other mappings have no technique");
+        bidirectional::change_technique(self, current, beta, random, to, rays)
+    }
+
+    /// Lets chains change techniques, where points have any.
+    pub fn with_technique_changes(mut self, allowed: bool) -> Self {
+        self.technique_changes = allowed && self.kind == MappingKind::Multiplexed;
+        self
+    }
+
+    /// Whether chains are to change techniques.
+    pub fn technique_changes(&self) -> bool {
+        self.technique_changes
     }
 
     /// Evaluates the proposals of all lanes that do not rest.

@@ -176,6 +176,7 @@ impl Engine for Mlt {
             counts.mutations += block.chains.mutations();
             counts.rays += rays;
             counts.non_finite += faults;
+            counts.technique_changes.merge(&block.chains.changed);
             for (sum, n) in [block.chains.small, block.chains.large] {
                 accepted = (accepted.0 + sum, accepted.1 + n);
             }

@@ -1,7 +1,7 @@
 //! What the render loop asks of a method.
 
 use crate::{
-    chain::Recorder,
+    chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
     path::Mapping,
     rng::Rng,
@@ -78,6 +78,8 @@ pub struct Counts {
     pub acceptance: Vec<f64>,
     /// Mean swap probability by pair of rungs, hottest first.
     pub swap: Vec<f64>,
+    /// Changes of technique; of the round, on a ladder.
+    pub technique_changes: TechniqueChanges,
 }
 
 /// A method at work. All state is a function of the job and the sweeps done, never of the threads or of how the sweeps

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::output::Picture;
 use super::status::{Observer, RunStart, Status, Summary};
+use crate::chain::TechniqueChanges;
 use crate::film::file::{FileError, check_writable};
 use crate::tempering::RoundReport;
 
@@ -173,6 +174,9 @@ struct Now<'a> {
     acceptance: &'a [f64],
     /// Of each pair of neighbours, hottest first.
     swap: &'a [f64],
+    /// Absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    technique_changes: Option<TechniqueChanges>,
     non_finite: u64,
     normalisation: Option<f64>,
     normalisation_error: Option<f64>,
@@ -188,6 +192,7 @@ impl<'a> From<&'a Status> for Now<'a> {
             rays: status.rays,
             acceptance: &status.acceptance,
             swap: &status.swap,
+            technique_changes: Some(status.technique_changes).filter(|changes| *changes != TechniqueChanges::default()),
             non_finite: status.non_finite,
             normalisation: status.normalisation.map(|(value, _)| value),
             normalisation_error: status.normalisation.map(|(_, error)| error),

@@ -66,6 +66,7 @@ impl Engine for ReplicaExchange {
             non_finite: self.sampler.non_finite(),
             acceptance,
             swap,
+            technique_changes: self.sampler.technique_changes(),
         }
     }
 

@@ -88,7 +88,7 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     };
     let film = job.scene.film;
     let stage = Stage {
-        mapping: Mapping::new(job.scene, mapping, widths),
+        mapping: Mapping::new(job.scene, mapping, widths).with_technique_changes(job.settings.technique_changes),
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(job.settings.seed),
     };
@@ -205,6 +205,7 @@ fn status(job: &Job, engine: &dyn Engine, watch: &Watch) -> Status {
         rays: counts.rays,
         acceptance: counts.acceptance,
         swap: counts.swap,
+        technique_changes: counts.technique_changes,
         non_finite: counts.non_finite,
         normalisation: None,
         last_round: watch.last_round.clone(),

@@ -185,6 +185,8 @@ pub struct Settings {
     pub measure: Measure,
     /// Write every rung's part of the image, for replica exchange.
     pub layers: bool,
+    /// Chains on the multiplexed mapping change the techniques of their paths.
+    pub technique_changes: bool,
     /// Large steps and their use, for `mlt`.
     pub mlt: MltSettings,
     /// Rays at a time.
@@ -209,6 +211,7 @@ impl Default for Settings {
             uniform_share: None,
             measure: Measure::default(),
             layers: false,
+            technique_changes: false,
             mlt: MltSettings::default(),
             packet: PacketChoice::default(),
         }

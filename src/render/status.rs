@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::output::Picture;
 use super::settings::Settings;
+use crate::chain::TechniqueChanges;
 use crate::path::MappingKind;
 use crate::tempering::RoundReport;
 
@@ -72,6 +73,8 @@ pub struct Status {
     pub acceptance: Vec<f64>,
     /// Mean swap probability of each pair of neighbours, hottest first; empty without a ladder.
     pub swap: Vec<f64>,
+    /// What became of changes of technique; of the round, on a ladder.
+    pub technique_changes: TechniqueChanges,
     /// Contributions that were not finite and were taken as zero.
     pub non_finite: u64,
     /// The estimate of c = ∫ g and its standard error, once there is one.

@@ -17,6 +17,8 @@ pub enum Move {
     Stratified,
     /// A small step of this law from the lane's current point.
     Small(StepLaw),
+    /// The given blocks, and uniform ones where none are given.
+    Given,
     /// The lane rests; nothing is drawn or evaluated.
     Rest,
 }
@@ -31,6 +33,8 @@ pub struct Proposals<'a> {
     pub rng: Rng,
     /// Where small steps start; at least as many lanes as `moves`.
     pub current: &'a Points,
+    /// The blocks of lanes that move by [`Move::Given`]; at least as many lanes as `moves` if there are any such.
+    pub given: &'a Points,
     /// The proposed points.
     pub points: &'a mut Points,
     /// Which words each lane draws.
@@ -123,6 +127,7 @@ impl Proposals<'_> {
     fn set(&mut self, block: u16, lane: usize, words: Block) {
         let proposed = match self.moves[lane] {
             Move::Small(law) if self.current.has(block, lane) => law.step(self.current.block(block, lane), words),
+            Move::Given if self.given.has(block, lane) => self.given.block(block, lane),
             Move::Stratified if block == 0 => within_pixel(self.counters[lane].ladder, self.film, words),
             _ => words,
         };
@@ -150,6 +155,7 @@ mod tests {
         let mut proposals = Proposals {
             rng: Rng::new(1),
             current: &current,
+            given: &current,
             points: &mut points,
             counters: &counters,
             moves,

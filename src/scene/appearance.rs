@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::{
     Profile,
-    materials::{Evaluation, Lobes, Material, Null, Scatter, ScatterSample},
+    materials::{Evaluation, Inverse, Lobes, Material, Null, Scatter, ScatterSample},
     parametrisation::Place,
     relief::{Relief, Tilt},
     textures::{Texture, Varying, scalar},
@@ -240,6 +240,14 @@ impl Mixture {
         None
     }
 
+    /// Of a single component whose normals are not bent.
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        match &self.0[..] {
+            [Component { material, tilt: None, .. }] => material.invert(wo, wi),
+            _ => None,
+        }
+    }
+
     fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
         self.0.iter().fold(Evaluation::ZERO, |sum, component| {
             let Evaluation { value, pdf } = component.evaluate(wo, wi);
@@ -290,6 +298,14 @@ pub enum ScatteringRef<'a> {
 }
 
 impl ScatteringRef<'_> {
+    /// See [`Scatter::invert`].
+    pub fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        match self {
+            ScatteringRef::Plain(material) => material.invert(wo, wi),
+            ScatteringRef::Mixed(mixture) => mixture.invert(wo, wi),
+        }
+    }
+
     /// Whether some lobe has a finite density.
     #[inline(always)]
     pub fn is_smooth<P: Profile>(&self) -> bool {

@@ -126,6 +126,19 @@ impl Emitters {
         [self.probability[light as usize] * place, rest]
     }
 
+    /// The light of that index.
+    pub fn light(&self, light: u32) -> &Light {
+        &self.lights[light as usize]
+    }
+
+    /// The numbers that choose a light: from the first to before the second.
+    pub fn choice_of(&self, light: u32) -> [f32; 2] {
+        match &self.choice {
+            Some(choice) if self.lights.len() > 1 => choice.range(light as usize),
+            _ => [0.0, 1.0],
+        }
+    }
+
     /// Where that light is, and with it what can find it.
     #[inline]
     pub fn kind(&self, light: u32) -> EmitterKind {

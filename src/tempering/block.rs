@@ -379,6 +379,9 @@ impl<W: Default> Part<W> {
     ) {
         let rng = self.evaluator.rng();
         self.evaluator.counters.iter_mut().for_each(|counter| counter.step = sweep);
+        if target.changes_techniques() {
+            self.change_techniques(target, canvas, round, rung);
+        }
         self.evaluator.moves[self.replicas..].fill(Move::Fresh);
         for at in 0..self.replicas {
             let k = usize::from(rung[self.lanes.start + at]);
@@ -407,6 +410,28 @@ impl<W: Default> Part<W> {
         }
         for at in self.replicas..evaluator.out.lanes.len() {
             tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
+        }
+    }
+
+    /// Changes of technique of some replicas, before they step: states and weights of the sweep are those that steps lead
+    /// to, so this costs evaluations and no weight.
+    fn change_techniques<T: Target<Workspace = W>>(
+        &mut self,
+        target: &T,
+        canvas: &Canvas,
+        round: &Round,
+        rung: &[u16],
+    ) {
+        let Part { walkers, evaluator, tally, lanes, replicas, .. } = self;
+        let rung_of = |at: usize| usize::from(rung[lanes.start + at]);
+        let beta_of = |at: usize| round.ladder.betas()[rung_of(at)];
+        evaluator.propose_changes(target, &walkers.points, *replicas, beta_of);
+        for i in 0..evaluator.drawn.len() {
+            let at = evaluator.drawn[i];
+            let k = rung_of(at);
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = evaluator.settle_change(walkers, at, beta_of(at), &mut record);
+            tally.counts[k].changes.count(alpha);
         }
     }
 }

@@ -9,7 +9,7 @@ use super::{
     steps::{SCALES, StepCount},
 };
 use crate::{
-    chain::Recorder,
+    chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Splats},
     path::Whole,
 };
@@ -221,6 +221,8 @@ pub struct Round {
 pub struct RungCounts {
     /// Small steps by scale.
     pub steps: [StepCount; SCALES],
+    /// Changes of technique.
+    pub changes: TechniqueChanges,
     /// Swaps with the next hotter rung.
     pub swaps: StepCount,
     /// Σ of ln g and weight of states in the two halves of the round.
@@ -235,6 +237,7 @@ impl RungCounts {
     /// Adds another part's counts.
     pub fn add(&mut self, other: &RungCounts) {
         self.steps.iter_mut().zip(other.steps).for_each(|(a, b)| *a += b);
+        self.changes.merge(&other.changes);
         self.swaps += other.swaps;
         self.halves.as_flattened_mut().iter_mut().zip(other.halves.as_flattened()).for_each(|(a, b)| *a += b);
         self.luminance += other.luminance;

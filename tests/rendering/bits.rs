@@ -14,7 +14,8 @@ use crate::support::{OWN, own, render, settings};
 /// Mutations a pixel of 24 × 24 pixels: enough for a bootstrap and three rounds after it.
 const MUTATIONS: f64 = 60.0;
 
-/// All methods, ladders of two and of five rungs, both combinations; Metropolis as it is and with all its options.
+/// All methods, ladders of two and of five rungs, both combinations; Metropolis as it is and with all its options; changes of
+/// technique.
 fn methods() -> Vec<Settings> {
     let of = |method| settings(method, MUTATIONS, 11);
     let re = |k, combine| Settings { ladder: LadderChoice::Replicas(k), combine, ..of(Method::ReplicaExchange) };
@@ -27,6 +28,11 @@ fn methods() -> Vec<Settings> {
         re(2, Combine::Balance),
         re(5, Combine::Balance),
         re(5, Combine::Target),
+        Settings {
+            mapping: MappingChoice::Fixed(MappingKind::Multiplexed),
+            technique_changes: true,
+            ..re(3, Combine::Balance)
+        },
     ]
 }
 

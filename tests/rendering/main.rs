@@ -2,7 +2,7 @@
 //!
 //! [`mapping`] batch against scalar; [`choice`] which mapping is chosen; [`furnace`] scenes whose image is a formula; [`references`] scenes rendered by
 //! another program to little noise; [`mitsuba`] small scenes with one feature each, the same; [`scattering`] materials
-//! value by value, the same; [`bits`] what must not change a bit; [`darkness`] scenes without light, with hardly any and
+//! value by value, the same; [`techniques`] changes of technique; [`bits`] what must not change a bit; [`darkness`] scenes without light, with hardly any and
 //! with too much.
 //!
 //! Statistical tests compare means over independent runs (samples of one chain correlate, runs do not), state their
@@ -17,3 +17,4 @@ mod mitsuba;
 mod references;
 mod scattering;
 mod support;
+mod techniques;

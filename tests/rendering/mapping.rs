@@ -75,8 +75,15 @@ fn compare<P: Profile>(
 
         let mut points = Points::new(LANES);
         let counters = counters(step);
-        let mut proposals =
-            Proposals { rng, current: &current, points: &mut points, counters: &counters, moves: &moves, film: FILM };
+        let mut proposals = Proposals {
+            rng,
+            current: &current,
+            given: &current,
+            points: &mut points,
+            counters: &counters,
+            moves: &moves,
+            film: FILM,
+        };
         let mut live = Vec::new();
         proposals.begin(&mut live);
         for lane in (0..LANES).filter(|lane| moves[*lane] == Move::Rest) {

@@ -86,6 +86,19 @@ fn chains_on_all_mappings_give_what_mitsuba_makes_of_paths() {
 }
 
 #[test]
+fn chains_that_change_techniques_give_what_mitsuba_makes_of_paths() {
+    for method in [Method::ReplicaExchange, Method::Mlt] {
+        let settings = Settings {
+            ladder: LadderChoice::Replicas(3),
+            technique_changes: true,
+            ..with(method, MappingKind::Multiplexed, 512.0)
+        };
+        let how = format!("{}-techniques", method.name());
+        check_with(&how, &settings, 0.03, &["disk-light", "everything", "rough-metal", "sphere-light"]);
+    }
+}
+
+#[test]
 fn materials_are_what_mitsuba_makes_of_them() {
     check(&["gold", "glass", "twosided", "pane", "plastics", "mixtures"]);
 }

@@ -73,16 +73,51 @@ impl Lengths {
         self.cumulative[edges - 1] - if edges > 1 { self.cumulative[edges - 2] } else { 0.0 }
     }
 
+    /// How many techniques make paths of that many edges.
+    fn techniques(edges: usize) -> u32 {
+        // s = 0 … n, but for lamps that are seen directly
+        if edges == 1 { 1 } else { edges as u32 + 1 }
+    }
+
+    /// A word that chooses technique `light` for paths of `edges` edges, uniform among all that do if `random` is uniform
+    /// among all words.
+    pub fn technique_word(&self, edges: usize, light: usize, random: u32) -> u32 {
+        let techniques = u64::from(Self::techniques(edges));
+        let start = |s: usize| ((s as u64) << 32).div_ceil(techniques);
+        let (first, end) = (start(light), start(light + 1));
+        (first + ((u64::from(random) * (end - first)) >> 32)) as u32
+    }
+
     /// The technique for a block of words, of which the second decides on the length and the third on the technique.
     #[inline]
     pub fn choose(&self, [_, length, technique, _]: Block) -> Chosen {
         let u = unit_f32(length);
         let edges = self.cumulative.partition_point(|c| *c <= u).min(self.cumulative.len() - 1) + 1;
-        // s = 0 … n, but for lamps that are seen directly
-        let techniques = if edges == 1 { 1 } else { edges as u32 + 1 };
+        let techniques = Self::techniques(edges);
         let light = ((u64::from(technique) * u64::from(techniques)) >> 32) as u16;
         let camera = edges as u16 + 1 - light;
         debug_assert!(Techniques::ALL.has(light, camera));
         Chosen { light, camera, scale: techniques as f32 / self.probability(edges) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_a_technique_choose_it() {
+        let lengths = Lengths::unknown(16);
+        for length in [0, 1 << 31, u32::MAX] {
+            let edges =
+                usize::from(lengths.choose([0, length, 0, 0]).light + lengths.choose([0, length, 0, 0]).camera) - 1;
+            for light in 0..Lengths::techniques(edges) as usize {
+                for random in [0, 1, 1 << 31, u32::MAX] {
+                    let word = lengths.technique_word(edges, light, random);
+                    let chosen = lengths.choose([0, length, word, 0]);
+                    assert_eq!(usize::from(chosen.light), light, "{edges} edges, {random}");
+                }
+            }
+        }
     }
 }

@@ -9,12 +9,14 @@
 //! tracing); Hachisuka et al. 2014, "Multiplexed Metropolis light transport".
 
 mod connections;
+mod inversion;
 mod lengths;
 pub mod scalar;
 mod subpath;
 mod techniques;
 mod weights;
 
+pub(super) use inversion::change_technique;
 pub use lengths::{Chosen, Lengths};
 pub use techniques::Techniques;
 

@@ -185,12 +185,12 @@ mod tests {
         }
 
         /// Density of x_k per area when it comes from x_{k−1}.
-        fn coming_from_light(&self, k: usize) -> f64 {
+        fn light_density(&self, k: usize) -> f64 {
             f64::from(self.onwards[k - 1]) * f64::from(self.cos_back[k]) / f64::from(self.distance2[k - 1])
         }
 
         /// Density of x_k per area when it comes from x_{k+1}.
-        fn coming_from_camera(&self, k: usize) -> f64 {
+        fn camera_density(&self, k: usize) -> f64 {
             let cos = f64::from(self.cos_onwards[k]);
             if k + 1 == self.edges() {
                 return f64::from(self.seen) * cos;
@@ -210,9 +210,9 @@ mod tests {
             let light: f64 = match s {
                 0 => 1.0,
                 1 => self.direct,
-                _ => self.start * (1..s).map(|k| self.coming_from_light(k)).product::<f64>(),
+                _ => self.start * (1..s).map(|k| self.light_density(k)).product::<f64>(),
             };
-            light * (s..self.edges()).map(|k| self.coming_from_camera(k)).product::<f64>()
+            light * (s..self.edges()).map(|k| self.camera_density(k)).product::<f64>()
         }
 
         /// What the others count beside technique s ≥ 2, by the recursion from the light.
@@ -255,12 +255,12 @@ mod tests {
             let (t, back_of) = (n + 1 - s, |k: usize| f64::from(self.back[k]));
             let mut others = 0.0;
             if s == 1 && techniques.hit && self.hittable {
-                others += square(self.coming_from_camera(0) / self.direct);
+                others += square(self.camera_density(0) / self.direct);
             }
             if s >= 2 {
                 let j = s - 1;
                 let tail = self.light_tail(techniques, s);
-                others += tail.others(self.coming_from_camera(j), back_of(j), techniques.has(j as u16, 2));
+                others += tail.others(self.camera_density(j), back_of(j), techniques.has(j as u16, 2));
             }
             if t >= 2 {
                 let (j, k) = (t - 1, s);
@@ -273,7 +273,7 @@ mod tests {
                     }
                     _ => {
                         let start = if s == 1 { square(self.start / self.direct) } else { 1.0 };
-                        start * tail.others(self.coming_from_light(k), onwards, techniques.has(2, j as u16))
+                        start * tail.others(self.light_density(k), onwards, techniques.has(2, j as u16))
                     }
                 };
             }

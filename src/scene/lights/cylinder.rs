@@ -4,9 +4,12 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec3};
 
-use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
+use super::{
+    Ball, Emission, EmissionInverse, Emit, EmitterKind, LightSample, from_surface, invert_surface, per_solid_angle,
+    surface_pdf, towards,
+};
 use crate::{
-    math::sin_cos_turn,
+    math::{sin_cos_turn, warp},
     scene::{Rgb, parametrisation::cylinder_uv, textures::Varying},
 };
 
@@ -41,6 +44,12 @@ impl Cylinder {
         let front = if self.flipped { -outside } else { outside };
         let radiance = self.radiance.at(|| cylinder_uv(&self.axes, self.length, from_start));
         (self.start + from_start, [front; 2], radiance)
+    }
+
+    /// The inverse of [`place`](Self::place).
+    fn invert_place(&self, q: Vec3) -> Option<[f32; 2]> {
+        let local = self.axes.transpose() * (q - self.start);
+        Some([warp::turn_of(local.x, local.y), local.z / self.length])
     }
 }
 
@@ -78,5 +87,13 @@ impl Emit for Cylinder {
     #[inline(always)]
     fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
         surface_pdf(1.0 / self.area(), normals, direction)
+    }
+
+    fn invert_emission(&self, q: Vec3, _triangle: u32, normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+        invert_surface(self.invert_place(q)?, normals, direction)
+    }
+
+    fn invert_sample(&self, _p: Vec3, _ng: Vec3, q: Vec3, _triangle: u32) -> Option<Option<[f32; 2]>> {
+        self.invert_place(q).map(Some)
     }
 }

@@ -4,7 +4,10 @@ use std::f32::consts::PI;
 
 use glam::{Mat3, Vec3};
 
-use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
+use super::{
+    Ball, Emission, EmissionInverse, Emit, EmitterKind, LightSample, from_surface, invert_surface, per_solid_angle,
+    surface_pdf, towards,
+};
 use crate::{
     math::{Frame, warp},
     scene::{Rgb, parametrisation::disk_uv, textures::Varying},
@@ -37,6 +40,12 @@ impl Disk {
         let from_centre = self.frame.s * d.x + self.frame.t * d.y;
         let radiance = self.radiance.at(|| disk_uv(&self.axes, self.radius, from_centre));
         (self.center + from_centre, [self.frame.n; 2], radiance)
+    }
+
+    /// The inverse of [`place`](Self::place).
+    fn invert_place(&self, q: Vec3) -> Option<[f32; 2]> {
+        let d = self.frame.to_local(q - self.center) / self.radius;
+        Some(warp::from_disk(d.truncate()))
     }
 }
 
@@ -74,5 +83,13 @@ impl Emit for Disk {
     #[inline(always)]
     fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
         surface_pdf(self.pdf_area(), normals, direction)
+    }
+
+    fn invert_emission(&self, q: Vec3, _triangle: u32, normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+        invert_surface(self.invert_place(q)?, normals, direction)
+    }
+
+    fn invert_sample(&self, _p: Vec3, _ng: Vec3, q: Vec3, _triangle: u32) -> Option<Option<[f32; 2]>> {
+        self.invert_place(q).map(Some)
     }
 }

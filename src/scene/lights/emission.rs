@@ -93,6 +93,21 @@ pub struct Emission {
     pub light: u32,
 }
 
+/// The numbers for which a light starts a subpath at a certain place in a certain direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmissionInverse {
+    /// Those of the place; `None` where any will do.
+    pub place: Option<[f32; 2]>,
+    /// Those of the direction.
+    pub direction: [f32; 2],
+}
+
+/// The inverse of [`from_surface`]'s direction.
+pub(super) fn invert_surface(place: [f32; 2], normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+    let local = Frame::new(shining_side(normals)).to_local(direction);
+    (local.z > 0.0).then(|| EmissionInverse { place: Some(place), direction: warp::from_cosine_hemisphere(local) })
+}
+
 /// The geometric normal on the side that shines: that of the shading normal.
 #[inline(always)]
 fn shining_side([geometric, shading]: [Vec3; 2]) -> Vec3 {
@@ -263,6 +278,49 @@ mod tests {
                 }
             }
             assert!(some > 2000, "{some} of 4096 of {light:?}");
+        }
+    }
+
+    /// All lights but those at infinity, spots and skies: the numbers that were drawn start the subpath again, and those
+    /// found for a place look for it, up to rounding.
+    #[test]
+    fn starts_are_inverted() {
+        for light in lights().iter().chain([&bent()]) {
+            let mut inverted = 0;
+            for (e, u) in emissions(light, 0, 1024) {
+                let Some(e) = e.filter(|e| e.weight != Rgb::ZERO) else { continue };
+                let rng = Rng::new(21);
+                let counter = Counter { ladder: 0, replica: 0, step: 0, purpose: Purpose::Primary };
+                let [a, b, ..] = rng.words(counter, 0).map(unit_f32);
+                // of a light with one triangle, or of the one that has the place
+                let triangle = (0..2).find(|t| {
+                    light.invert_emission(e.origin, *t, e.normals, e.direction).is_some_and(|inverse| {
+                        let again =
+                            light.emit::<FullProfile>(inverse.place.unwrap_or([a, b]), inverse.direction, SCENE);
+                        again.is_some_and(|again| {
+                            (again.origin - e.origin).length() < 1e-4 && (again.direction - e.direction).length() < 1e-4
+                        })
+                    })
+                });
+                let Some(triangle) = triangle else { continue };
+                inverted += 1;
+                let from = e.origin + e.direction + 0.1 * warp::sphere(u);
+                let normal = -e.direction;
+                let Some(shape) = light.invert_sample(from, normal, e.origin, triangle) else {
+                    panic!("{light:?} starts subpaths that next-event estimation does not find")
+                };
+                let hidden = (from - e.origin).dot(e.ng) < 0.0; // behind what is nearer, on spheres
+                let sample = light.sample::<FullProfile>(from, normal, shape.unwrap_or([a, b]));
+                if let Some(sample) = sample.filter(|_| !hidden) {
+                    let found = sample.origin + sample.wi * (sample.tfar / crate::scene::lights::SHORT_OF_LIGHT);
+                    assert!((found - e.origin).length() < 2e-3, "{found} for {e:?} of {light:?}");
+                }
+            }
+            let known = matches!(
+                light,
+                Light::MeshLight(_) | Light::Disk(_) | Light::Cylinder(_) | Light::Sphere(_) | Light::Point(_)
+            );
+            assert!(if known { inverted > 500 } else { inverted == 0 }, "{inverted} of {light:?}");
         }
     }
 

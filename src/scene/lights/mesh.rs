@@ -4,7 +4,10 @@ use std::{f32::consts::PI, sync::Arc};
 
 use glam::Vec3;
 
-use super::{Ball, Emission, Emit, EmitterKind, LightSample, from_surface, per_solid_angle, surface_pdf, towards};
+use super::{
+    Ball, Emission, EmissionInverse, Emit, EmitterKind, LightSample, from_surface, invert_surface, per_solid_angle,
+    surface_pdf, towards,
+};
 use crate::{
     math::{Cumulative, warp},
     scene::{Mesh, Rgb, textures::Varying},
@@ -46,6 +49,17 @@ impl MeshLight {
         let normals = [n, self.mesh.shading_normal(triangle as u32, b, c, n)];
         (p0 + e1 * b + e2 * c, normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
     }
+
+    /// The inverse of [`place`](Self::place).
+    fn invert_place(&self, q: Vec3, triangle: u32) -> Option<[f32; 2]> {
+        let [p0, p1, p2] = self.mesh.corners(triangle).map(|p| p.as_dvec3());
+        let (e1, e2, to) = (p1 - p0, p2 - p0, q.as_dvec3() - p0);
+        let n = e1.cross(e2);
+        let coordinate = |across: glam::DVec3| (across.dot(n) / n.length_squared()).clamp(0.0, 1.0) as f32;
+        let [within, v] = warp::from_triangle([coordinate(to.cross(e2)), coordinate(e1.cross(to))]);
+        let [start, end] = self.triangles.range(triangle as usize);
+        (start < end).then_some([start + within * (end - start), v])
+    }
 }
 
 impl Emit for MeshLight {
@@ -82,5 +96,17 @@ impl Emit for MeshLight {
     #[inline(always)]
     fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
         surface_pdf(self.inverse_area, normals, direction)
+    }
+
+    fn triangle(&self, place: [f32; 2]) -> u32 {
+        self.triangles.index(place[0]) as u32
+    }
+
+    fn invert_emission(&self, q: Vec3, triangle: u32, normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+        invert_surface(self.invert_place(q, triangle)?, normals, direction)
+    }
+
+    fn invert_sample(&self, _p: Vec3, _ng: Vec3, q: Vec3, triangle: u32) -> Option<Option<[f32; 2]>> {
+        self.invert_place(q, triangle).map(Some)
     }
 }

@@ -22,7 +22,7 @@ pub use constant::Constant;
 pub use cylinder::Cylinder;
 pub use directional::Directional;
 pub use disk::Disk;
-pub use emission::{Ball, Emission, EmitterKind};
+pub use emission::{Ball, Emission, EmissionInverse, EmitterKind};
 pub use envmap::Envmap;
 pub use mesh::MeshLight;
 pub use point::Point;
@@ -38,7 +38,7 @@ use super::{
     textures::Varying,
 };
 use crate::math::offset_origin;
-use emission::{from_infinity, from_point, from_surface, surface_pdf};
+use emission::{from_infinity, from_point, from_surface, invert_surface, surface_pdf};
 
 /// A direction towards a light.
 #[derive(Clone, Copy, Debug)]
@@ -98,6 +98,26 @@ trait Emit {
     /// those geometric and shading normals in the unit vector `direction`, in which light leaves. Of single directions
     /// that is the light's own; of points the place is the light's.
     fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, scene: Ball) -> [f32; 2];
+    /// The triangle of a mesh that has the place of [`emit`](Self::emit) and, on meshes, of [`sample`](Self::sample).
+    fn triangle(&self, _place: [f32; 2]) -> u32 {
+        0
+    }
+    /// The numbers that [`emit`](Self::emit) starts a subpath with at the place `q` with those normals, on that triangle of
+    /// a mesh, in the direction in which light leaves; `None` where they are not known.
+    fn invert_emission(
+        &self,
+        _q: Vec3,
+        _triangle: u32,
+        _normals: [Vec3; 2],
+        _direction: Vec3,
+    ) -> Option<EmissionInverse> {
+        None
+    }
+    /// The numbers for which [`sample`](Self::sample) looks from `p` to the place `q`, itself `None` where any will do;
+    /// `None` where they are not known.
+    fn invert_sample(&self, _p: Vec3, _ng: Vec3, _q: Vec3, _triangle: u32) -> Option<Option<[f32; 2]>> {
+        None
+    }
 }
 
 macro_rules! registry {
@@ -212,6 +232,29 @@ impl Light {
     /// Emitted power in W, up to the unit of the scene, per channel; `scene_radius` is that of a sphere around it.
     pub fn power(&self, scene_radius: f32) -> Rgb {
         self.as_emit().power(scene_radius)
+    }
+
+    /// The triangle of a mesh where subpaths start, and where it is seen, for those numbers.
+    pub fn triangle(&self, place: [f32; 2]) -> u32 {
+        self.as_emit().triangle(place)
+    }
+
+    /// The numbers that [`emit`](Light::emit) starts a subpath with at the place `q` with those normals, on that triangle
+    /// of a mesh, in the direction in which light leaves; `None` where they are not known.
+    pub fn invert_emission(
+        &self,
+        q: Vec3,
+        triangle: u32,
+        normals: [Vec3; 2],
+        direction: Vec3,
+    ) -> Option<EmissionInverse> {
+        self.as_emit().invert_emission(q, triangle, normals, direction)
+    }
+
+    /// The numbers for which [`sample`](Light::sample) looks from `p` with geometric normal `ng` to the place `q` on that
+    /// triangle of a mesh, themselves `None` where any will do; `None` where they are not known.
+    pub fn invert_sample(&self, p: Vec3, ng: Vec3, q: Vec3, triangle: u32) -> Option<Option<[f32; 2]>> {
+        self.as_emit().invert_sample(p, ng, q, triangle)
     }
 
     /// The largest channel of any radiance, intensity or irradiance it can show.

@@ -4,7 +4,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{Ball, Emission, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_point, origin_towards};
+use super::{
+    Ball, Emission, EmissionInverse, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_point, origin_towards,
+};
 use crate::{
     math::warp,
     scene::{Rgb, parameters::Parameters},
@@ -74,5 +76,19 @@ impl Emit for Point {
     #[inline(always)]
     fn emission_pdf(&self, _normals: [Vec3; 2], _direction: Vec3, _scene: Ball) -> [f32; 2] {
         [1.0, PDF]
+    }
+
+    fn invert_emission(
+        &self,
+        _q: Vec3,
+        _triangle: u32,
+        _normals: [Vec3; 2],
+        direction: Vec3,
+    ) -> Option<EmissionInverse> {
+        Some(EmissionInverse { place: None, direction: warp::from_sphere(direction) })
+    }
+
+    fn invert_sample(&self, _p: Vec3, _ng: Vec3, _q: Vec3, _triangle: u32) -> Option<Option<[f32; 2]>> {
+        Some(None)
     }
 }

@@ -5,8 +5,8 @@ use std::f32::consts::{PI, TAU};
 use glam::{Mat3, Vec3};
 
 use super::{
-    Ball, Emission, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_surface, origin_towards, per_solid_angle,
-    surface_pdf, towards,
+    Ball, Emission, EmissionInverse, Emit, EmitterKind, LightSample, SHORT_OF_LIGHT, from_surface, invert_surface,
+    origin_towards, per_solid_angle, surface_pdf, towards,
 };
 use crate::{
     math::{Frame, warp},
@@ -49,6 +49,11 @@ impl Sphere {
     fn one_minus_cos(&self, origin: Vec3) -> Option<f32> {
         let sin2 = self.radius * self.radius / (self.center - origin).length_squared();
         (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    }
+
+    /// The inverse of [`place`](Self::place).
+    fn invert_place(&self, q: Vec3) -> Option<[f32; 2]> {
+        Some(warp::from_sphere((q - self.center).normalize_or_zero()))
     }
 }
 
@@ -114,5 +119,19 @@ impl Emit for Sphere {
     #[inline(always)]
     fn emission_pdf(&self, normals: [Vec3; 2], direction: Vec3, _scene: Ball) -> [f32; 2] {
         surface_pdf(self.pdf_area(), normals, direction)
+    }
+
+    fn invert_emission(&self, q: Vec3, _triangle: u32, normals: [Vec3; 2], direction: Vec3) -> Option<EmissionInverse> {
+        invert_surface(self.invert_place(q)?, normals, direction)
+    }
+
+    fn invert_sample(&self, p: Vec3, ng: Vec3, q: Vec3, _triangle: u32) -> Option<Option<[f32; 2]>> {
+        let towards_center = origin_towards(p, ng, self.center - p);
+        let Some(one_minus_cos) = self.one_minus_cos(towards_center) else {
+            return self.invert_place(q).map(Some);
+        };
+        let wi = (q - origin_towards(p, ng, q - p)).normalize();
+        let local = Frame::new((self.center - towards_center).normalize()).to_local(wi);
+        Some(Some(warp::from_cone(local, one_minus_cos)))
     }
 }

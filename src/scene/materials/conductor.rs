@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
+use super::{Evaluation, Inverse, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Perfect reflection weighted by the conductor's Fresnel reflectance.
@@ -92,6 +92,10 @@ impl Scatter for Conductor {
             pdf: f32::INFINITY,
             eta: 1.0,
         })
+    }
+
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        (wo.z > 0.0 && wi.z > 0.0).then_some(Inverse::of_perfect([0.0, 1.0]))
     }
 
     #[inline(always)]

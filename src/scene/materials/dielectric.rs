@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
+use super::{Evaluation, Inverse, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{
     Rgb,
     parameters::{NumberOrName, Parameters},
@@ -55,6 +55,12 @@ impl Interface {
     }
 }
 
+/// Of an interface that reflects where the choice is below `reflectance`, and else lets through.
+pub(super) fn perfect_inverse(reflectance: f32, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+    let choice = if wo.z * wi.z > 0.0 { [0.0, reflectance] } else { [reflectance, 1.0] };
+    (choice[1] > choice[0]).then_some(Inverse::of_perfect(choice))
+}
+
 impl Scatter for Dielectric {
     const VARYING: &'static [VaryingParameter] = Interface::VARYING;
 
@@ -79,6 +85,12 @@ impl Scatter for Dielectric {
         let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -cos_t.copysign(wo.z));
         let weight = specular_transmittance / (eta * eta);
         Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta })
+    }
+
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        let eta = if wo.z >= 0.0 { self.interface.eta } else { 1.0 / self.interface.eta };
+        let (reflectance, _) = fresnel::dielectric(wo.z.abs(), eta);
+        perfect_inverse(reflectance, wo, wi)
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter};
+use super::{Evaluation, Inverse, Lobes, Scatter, ScatterSample, VaryingParameter};
 use crate::{
     math::warp,
     scene::{Rgb, parameters::Parameters},
@@ -36,6 +36,10 @@ impl Scatter for Diffuse {
             pdf: warp::cosine_hemisphere_pdf(wi.z),
             eta: 1.0,
         })
+    }
+
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        (wo.z > 0.0 && wi.z > 0.0).then(|| Inverse::of_one_lobe(warp::from_cosine_hemisphere(wi)))
     }
 
     #[inline(always)]

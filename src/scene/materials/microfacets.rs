@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
-use crate::math::{sin_cos_turn, warp::INV_PI};
+use crate::math::{
+    sin_cos_turn,
+    warp::{self, INV_PI},
+};
 use crate::scene::{Rgb, parameters::Parameters, textures::scalar};
 
 /// A distribution of microfacet normals m over the upper hemisphere, with separable masking by Smith. Two roughnesses
@@ -140,6 +143,22 @@ impl Microfacets {
         self.facet(m)
     }
 
+    /// The inverse of [`sample_visible`](Microfacets::sample_visible).
+    pub fn invert_visible(&self, v: Vec3, m: Vec3) -> [f32; 2] {
+        let stretched = self.stretched(v);
+        // (x, y, 1) are proportional to a normal of the surface of roughness 1
+        let [x, y] = [m.x / (m.z * self.alpha_u), m.y / (m.z * self.alpha_v)];
+        match self.shape {
+            FacetShape::Ggx => {
+                let n = Vec3::new(x, y, 1.0).normalize();
+                let reflected = 2.0 * stretched.dot(n) * n - stretched;
+                let u = (reflected.z + stretched.z) / (1.0 + stretched.z);
+                [warp::turn_of(reflected.x, reflected.y), 1.0 - u]
+            }
+            FacetShape::Beckmann => part_of_visible_gaussian_slopes(stretched, [-x, -y]),
+        }
+    }
+
     /// Where a surface of roughness 1 looks from as this one does from `v`.
     #[inline(always)]
     pub fn stretched(&self, v: Vec3) -> Vec3 {
@@ -163,6 +182,8 @@ impl Microfacets {
 const FRAC_1_SQRT_PI: f64 = 0.564_189_583_547_756_3;
 /// Squared slope over α² from which on Beckmann's density is as good as 0: e⁻⁸⁰.
 const NO_FACETS: f32 = 80.0;
+/// Slopes of a surface of roughness 1 beyond are less probable than 10⁻¹⁶.
+const STEEPEST: f64 = 6.0;
 /// Beckmann's Λ(a) is below 10⁻⁹ from here on.
 const NOTHING_IS_MASKED: f32 = 4.0;
 
@@ -187,6 +208,22 @@ fn visible_gaussian_slope(v: Vec3, u: [f32; 2]) -> [f32; 2] {
     [cos_phi * along - sin_phi * across, sin_phi * along + cos_phi * across]
 }
 
+/// The inverse of [`visible_gaussian_slope`].
+fn part_of_visible_gaussian_slopes(v: Vec3, [x, y]: [f32; 2]) -> [f32; 2] {
+    let sin = (v.x * v.x + v.y * v.y).sqrt();
+    let tan = f64::from(sin) / f64::from(v.z.max(f32::MIN_POSITIVE));
+    let (cos_phi, sin_phi) = if sin > 0.0 { (v.x / sin, v.y / sin) } else { (1.0, 0.0) };
+    let (along, across) = (cos_phi * x + sin_phi * y, cos_phi * y - sin_phi * x);
+    [part_below(along, tan), part_below(across, 0.0)]
+}
+
+/// The inverse of [`slope_along`].
+fn part_below(slope: f32, tan: f64) -> f32 {
+    let below = |s: f64| libm::erfc(-s) + tan * FRAC_1_SQRT_PI * libm::exp(-s * s);
+    let end = if tan * STEEPEST > 1.0 { 1.0 / tan } else { STEEPEST };
+    (below(f64::from(slope).min(end)) / below(end)) as f32
+}
+
 /// The slope s below which the part `u` of what is seen lies, seen at an angle with that tangent: the solution of
 /// F(s) = u F(1/tan) with F(s) = 1 + erf(s) + tan/√π exp(−s²), the integral of visible slopes
 /// (1 − s tan) exp(−s²), which end at 1/tan.
@@ -195,8 +232,6 @@ fn visible_gaussian_slope(v: Vec3, u: [f32; 2]) -> [f32; 2] {
 /// with erfc, so that slopes far in the lower tail keep their digits.
 #[inline(always)]
 fn slope_along(u: f32, tan: f64) -> f32 {
-    /// Slopes beyond are less probable than 10⁻¹⁶.
-    const STEEPEST: f64 = 6.0;
     const PRECISION: f64 = 1e-8;
     let weight = tan * FRAC_1_SQRT_PI;
     let below = |s: f64| libm::erfc(-s) + weight * libm::exp(-s * s);

@@ -72,6 +72,27 @@ impl Evaluation {
     pub const ZERO: Evaluation = Evaluation { value: Rgb::ZERO, pdf: 0.0 };
 }
 
+/// The primary samples for which [`Scatter::sample`] gives a certain direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inverse {
+    /// Those of the lobe's shape; `None` where any will do, as for perfect lobes.
+    pub shape: Option<[f32; 2]>,
+    /// Those of the choice: from the first to before the second.
+    pub choice: [f32; 2],
+}
+
+impl Inverse {
+    /// Of the only lobe there is.
+    fn of_one_lobe(shape: [f32; 2]) -> Inverse {
+        Inverse { shape: Some(shape), choice: [0.0, 1.0] }
+    }
+
+    /// Of a perfect lobe.
+    fn of_perfect(choice: [f32; 2]) -> Inverse {
+        Inverse { shape: None, choice }
+    }
+}
+
 /// What lobes a material has, for leaving out what a scene does not need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lobes {
@@ -157,6 +178,11 @@ pub trait Scatter: Copy {
     fn lobes(&self) -> Lobes;
     /// Samples a direction from two primary samples for the lobe's shape and one for the choice of the lobe.
     fn sample(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample>;
+    /// The inverse of [`sample`](Scatter::sample); `None` where `wi` is not sampled, or not by one set of numbers that is
+    /// known. Perfect lobes take `wi` for the direction on its side of the surface that they give.
+    fn invert(&self, _wo: Vec3, _wi: Vec3) -> Option<Inverse> {
+        None
+    }
     /// Value and density of a given pair.
     fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation;
     /// Reads itself from a scene element.
@@ -218,6 +244,11 @@ macro_rules! registry {
             #[inline(always)]
             pub fn sample(&self, wo: Vec3, u: [f32; 2], choice: f32) -> Option<ScatterSample> {
                 match self { $(Material::$material(m) => m.sample(wo, u, choice)),+ }
+            }
+
+            /// See [`Scatter::invert`].
+            pub fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+                match self { $(Material::$material(m) => m.invert(wo, wi)),+ }
             }
 
             /// See [`Scatter::evaluate`].

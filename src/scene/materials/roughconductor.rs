@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::conductor::{Metal, gold};
 use super::microfacets::{FacetShape, LEAST_ALPHA, Microfacets};
-use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter};
+use super::{Evaluation, Inverse, Lobes, Scatter, ScatterSample, VaryingParameter};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Tiny mirrors of metal: f = F D G/(4 cos θₒ cos θᵢ), without the light that goes on between them.
@@ -55,6 +55,14 @@ impl Scatter for RoughConductor {
         let pdf = self.facets.visible_density(wo, m) / (4.0 * cos);
         let weight = self.metal.reflectance(cos) * self.facets.masking(wi, m);
         (pdf > 0.0).then_some(ScatterSample { wi, weight, pdf, eta: 1.0 })
+    }
+
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return None;
+        }
+        let m = (wo + wi).normalize();
+        (wo.dot(m) > 0.0).then(|| Inverse::of_one_lobe(self.facets.invert_visible(wo, m)))
     }
 
     #[inline(always)]

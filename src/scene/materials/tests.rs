@@ -83,6 +83,44 @@ fn sampled_weights_are_value_over_density() {
     }
 }
 
+/// Up to the digits that f32 keeps of narrow lobes and grazing directions: what is inverted is sampled again, and most of
+/// it with the same numbers.
+#[test]
+fn what_is_sampled_is_inverted() {
+    for material in Material::examples() {
+        let (mut inverted, mut same, mut all) = (0, 0, 0);
+        for wo in at(&[1.0, 0.7, 0.2]) {
+            for [a, b, c] in randoms(300) {
+                let Some(s) = material.sample(wo, [a, b], c) else { continue };
+                all += 1;
+                let Some(Inverse { shape, choice: [start, end] }) = material.invert(wo, s.wi) else { continue };
+                inverted += 1;
+                assert!(start <= c && c < end, "{material:?} from {wo}: {c} is not in {start} … {end}");
+                assert_eq!(shape.is_none(), s.pdf == f32::INFINITY, "{material:?}");
+                let again = material.sample(wo, shape.unwrap_or([0.3, 0.9]), 0.5 * (start + end));
+                let off = again.map_or(f32::INFINITY, |again| (again.wi - s.wi).length());
+                assert!(off < 2e-3, "{material:?} from {wo}: {:?} for {s:?} by {shape:?} for {:?}", again, [a, b]);
+                let apart = |i: usize, u: f32| shape.map_or(0.0, |shape| (shape[i] - u).abs());
+                let near = |d: f32| d.min(1.0 - d) < 1e-3;
+                same += usize::from(near(apart(0, a)) && near(apart(1, b)));
+            }
+        }
+        let one_lobe = matches!(
+            material,
+            Material::Diffuse(_)
+                | Material::Conductor(_)
+                | Material::Dielectric(_)
+                | Material::ThinDielectric(_)
+                | Material::RoughConductor(_)
+        );
+        assert!(
+            if one_lobe { inverted == all && all > 500 } else { inverted == 0 },
+            "{material:?}: {inverted} of {all}"
+        );
+        assert!(same as f64 >= 0.9 * f64::from(inverted), "{material:?}: {same} of {inverted} by the same numbers");
+    }
+}
+
 /// Energy that leaves for that which comes, and its standard error.
 fn albedo(material: &Material, wo: Vec3) -> (Rgb, f32) {
     let n = 20_000;

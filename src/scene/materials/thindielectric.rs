@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::dielectric::Interface;
-use super::{Evaluation, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
+use super::dielectric::{Interface, perfect_inverse};
+use super::{Evaluation, Inverse, Lobes, Scatter, ScatterSample, VaryingParameter, fresnel};
 use crate::scene::{Rgb, parameters::Parameters};
 
 /// Reflects and lets through as two parallel smooth interfaces do together: with all reflections between them,
@@ -39,6 +39,11 @@ impl Scatter for ThinDielectric {
             (-wo, self.interface.specular_transmittance)
         };
         Some(ScatterSample { wi, weight, pdf: f32::INFINITY, eta: 1.0 })
+    }
+
+    fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {
+        let one = fresnel::dielectric(wo.z.abs(), self.interface.eta).0;
+        perfect_inverse(2.0 * one / (1.0 + one), wo, wi)
     }
 
     #[inline(always)]

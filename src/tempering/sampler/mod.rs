@@ -28,7 +28,7 @@ use super::{
     tuning::Choice,
 };
 use crate::{
-    chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target},
+    chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target, TechniqueChanges},
     film::{Accumulator, Footprint},
     rng::Rng,
 };
@@ -380,6 +380,13 @@ impl<W: Default + Send> Sampler<W> {
             all.acceptance()
         });
         (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
+    }
+
+    /// What became of changes of technique, in this round.
+    pub fn technique_changes(&self) -> TechniqueChanges {
+        let mut all = TechniqueChanges::default();
+        self.counts_by_rung().iter().for_each(|counts| all.merge(&counts.changes));
+        all
     }
 
     /// Whether chains follow the luminance weighed by an importance: only the balanced image allows for that.

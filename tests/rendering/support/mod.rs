@@ -2,7 +2,7 @@
 
 mod agreement;
 mod scenes;
-mod statistics;
+pub mod statistics;
 
 pub use agreement::{Agreement, Expected};
 pub use scenes::{OWN, fixed_widths, load, own, render, repository, runs, scene_of, settings};
