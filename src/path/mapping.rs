@@ -138,7 +138,7 @@ impl<'s> Mapping<'s> {
         Mapping {
             scene,
             kind,
-            lengths: Lengths::unknown(layout.max_depth()),
+            lengths: Lengths::new(layout.max_depth()),
             layout,
             widths,
             technique_changes: false,

@@ -27,7 +27,7 @@ impl Chosen {
 
 /// How often paths of each number of edges are chosen.
 ///
-/// The length follows the given shares, the technique is uniform among those that make paths of that length, so that a
+/// Longer ones are rarer by a constant factor; the technique is uniform among those that make paths of that length, so that a
 /// small step in either of two dimensions keeps the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lengths {
@@ -38,29 +38,24 @@ pub struct Lengths {
 /// Edges of the longest paths that are told apart; of those that a scene without limit could have, the longer ones are
 /// left out.
 const LONGEST: u16 = 128;
-/// How much rarer paths of one more edge are, where nothing is known of a scene.
+/// How much rarer paths of one more edge are.
 const DECAY: f64 = 0.75;
-/// The part of all points that follows [`DECAY`] whatever is known.
-const UNKNOWN: f64 = 0.2;
 
 impl Lengths {
-    /// For paths of up to `max_depth` edges of which nothing is known.
-    pub fn unknown(max_depth: u16) -> Lengths {
-        Lengths::of_shares(max_depth, &[])
-    }
-
-    /// In proportion to what paths of 1, 2, … edges contribute, as far as that is known.
-    pub fn of_shares(max_depth: u16, shares: &[f64]) -> Lengths {
+    /// For paths of up to `max_depth` edges.
+    ///
+    /// In proportion to what paths of each length were found to contribute to the picture, relative to its luminance, the
+    /// squared error of `mlt` on `lattice` fell to 0.6 to 0.8 at equal time and nothing changed on `cornell-box` and
+    /// `caustic`, but there the brightness of `re` differed by 4 % between seeds in the place of 1 %: lamps that are seen
+    /// directly, all of them paths of one edge, got too few points.
+    pub fn new(max_depth: u16) -> Lengths {
         let longest = usize::from(max_depth.min(LONGEST));
-        let known: f64 = shares.iter().take(longest).sum();
-        let decay = |i: usize| DECAY.powi(i as i32);
-        let all: f64 = (0..longest).map(decay).sum();
+        let shares = (0..longest).map(|i| DECAY.powi(i as i32));
+        let all: f64 = shares.clone().sum();
         let mut sum = 0.0;
-        let mut cumulative: Vec<f32> = (0..longest)
-            .map(|i| {
-                let guess = decay(i) / all;
-                let share = shares.get(i).copied().unwrap_or(0.0);
-                sum += if known > 0.0 { UNKNOWN * guess + (1.0 - UNKNOWN) * share / known } else { guess };
+        let mut cumulative: Vec<f32> = shares
+            .map(|share| {
+                sum += share / all;
                 sum as f32
             })
             .collect();
@@ -107,7 +102,7 @@ mod tests {
 
     #[test]
     fn words_of_a_technique_choose_it() {
-        let lengths = Lengths::unknown(16);
+        let lengths = Lengths::new(16);
         for length in [0, 1 << 31, u32::MAX] {
             let edges =
                 usize::from(lengths.choose([0, length, 0, 0]).light + lengths.choose([0, length, 0, 0]).camera) - 1;
