@@ -171,7 +171,7 @@ impl<'s> Mapping<'s> {
         self.widths
     }
 
-    /// Another technique for the path of a lane's point: see [`bidirectional`](super::bidirectional) for the law, at inverse
+    /// Another technique for the path of a lane's point: see [`bidirectional`] for the law, at inverse
     /// temperature `beta`. The blocks of which it decides go to the same lane of `to`. The expected change of ln g; `None`
     /// where the technique is to stay.
     pub fn change_technique(
