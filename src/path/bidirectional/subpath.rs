@@ -153,7 +153,9 @@ impl Particle {
                 step.cos = f64::from(cos_light);
                 step.before = hit(true);
                 if !P::FLAT_MESHES {
-                    let pdf = scene.emitters.pdf::<P>(emission.light, surface.p, emission.origin, emission.normals[0]);
+                    // from where next-event estimation would look: on a sphere or off it makes a difference
+                    let from = Site::of(surface).start_towards(-emission.direction);
+                    let pdf = scene.emitters.pdf::<P>(emission.light, from, emission.origin, emission.normals[0]);
                     step.shorter = direct(pdf * cos_light / d2);
                 }
                 step.arrive(d2, cos)
