@@ -149,7 +149,8 @@ pub(super) fn connection<P: Profile>(
 /// Of camera paths alone the reflectance of each vertex serves best: at equal time `lattice` has 0.60, `caustic` 0.90 and
 /// `cornell-box` 0.97 times the squared error that it has with the whole throughput, which ends three of four paths at
 /// once where roulette begins. Where light subpaths help, the camera's need not be long: by the reflectance of each vertex
-/// the errors are 1.12, 1.26 and 1.10 times as large.
+/// the errors are 1.12, 1.26 and 1.10 times as large. (`relt render --method path --mapping unidirectional`, or
+/// `bidirectional`, `--mpp 32`, one seed, by processor time.)
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Roulette {
     /// The part of the light that this vertex scatters.

@@ -204,14 +204,8 @@ fn start_at_light<P: Profile, const ONE: bool>(
     w: &mut Arrays,
 ) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
-    w.lanes.clear();
-    if ONE {
-        w.lanes.extend(w.live.iter().filter(|lane| w.chosen[**lane as usize].light > 1));
-    } else {
-        w.lanes.extend_from_slice(&w.live);
-    }
+    begin_subpaths::<ONE>(w, |chosen| chosen.light > 1);
     proposals.draw(layout.emission(), &w.lanes);
-    w.rays.clear();
     w.particles.clear();
     w.emissions.clear();
     w.waiting.clear();
@@ -235,6 +229,14 @@ fn start_at_light<P: Profile, const ONE: bool>(
     if techniques.lamp {
         splat(mapping, tracing, w, out);
     }
+}
+
+/// Lists the lanes that have a subpath of one kind, all of them where points do not choose, and forgets old rays.
+fn begin_subpaths<const ONE: bool>(w: &mut Arrays, has: impl Fn(&Chosen) -> bool) {
+    w.lanes.clear();
+    w.lanes.extend(w.live.iter().filter(|lane| !ONE || has(&w.chosen[**lane as usize])));
+    w.rays.clear();
+    w.steps.resize(w.live.len(), Step::NOWHERE);
 }
 
 /// The start of a lane's light subpath.
@@ -308,9 +310,6 @@ fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposa
         if let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) {
             w.lanes[kept] = lane;
             w.particles[kept] = edge.particle;
-            if w.steps.len() <= kept {
-                w.steps.push(edge.step);
-            }
             w.steps[kept] = edge.step;
             w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
             kept += 1;
@@ -366,13 +365,7 @@ fn follow_camera<P: Profile, const ONE: bool>(
 
 /// Starts a camera subpath in every lane that has one.
 fn start_at_camera<const ONE: bool>(mapping: &Mapping, w: &mut Arrays) {
-    w.lanes.clear();
-    if ONE {
-        w.lanes.extend(w.live.iter().filter(|lane| w.chosen[**lane as usize].camera > 1));
-    } else {
-        w.lanes.extend_from_slice(&w.live);
-    }
-    w.rays.clear();
+    begin_subpaths::<ONE>(w, |chosen| chosen.camera > 1);
     w.carried.clear();
     for &lane in &w.lanes {
         let ray = mapping.scene().camera.ray(w.film[lane as usize], w.lens[lane as usize]);
@@ -458,9 +451,6 @@ fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, propos
         if let Some((edge, step)) = subpath::scatter_camera::<P>(&surface, &end, &decisions, techniques, j) {
             w.lanes[kept] = lane;
             w.carried[kept] = edge.carried;
-            if w.steps.len() <= kept {
-                w.steps.push(step);
-            }
             w.steps[kept] = step;
             w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
             kept += 1;

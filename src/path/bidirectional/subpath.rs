@@ -140,7 +140,7 @@ impl Particle {
     ) -> Arrival {
         let cos = surface.ng.dot(emission.direction).abs();
         let pdf_place = f64::from(emission.pdf_place);
-        let hit = |there: bool| if there && techniques.hit { 1.0 / (pdf_place * pdf_place) } else { 0.0 };
+        let hit = if techniques.hit { 1.0 / (pdf_place * pdf_place) } else { 0.0 };
         let mut step = Step { density: f64::from(emission.pdf_rest), cos: 1.0, before: 0.0, shorter: 1.0 };
         let d2 = (surface.p - emission.origin).length_squared();
         let direct = |pdf: f32| {
@@ -151,7 +151,7 @@ impl Particle {
             EmitterKind::Surface => {
                 let cos_light = emission.normals[0].dot(emission.direction).abs();
                 step.cos = f64::from(cos_light);
-                step.before = hit(true);
+                step.before = hit;
                 if !P::FLAT_MESHES {
                     // from where next-event estimation would look: on a sphere or off it makes a difference
                     let from = Site::of(surface).start_towards(-emission.direction);
@@ -164,7 +164,7 @@ impl Particle {
             EmitterKind::Point => step.arrive(d2, cos),
             EmitterKind::SingleDirection => step.arrive_from_infinity(cos),
             EmitterKind::Surrounding => {
-                step.before = hit(true);
+                step.before = hit;
                 let towards = -emission.direction;
                 let pdf = scene.emitters.pdf::<P>(emission.light, surface.p, towards, towards);
                 step.shorter = direct(pdf);
@@ -199,8 +199,9 @@ pub(super) struct LightEdge {
 
 /// Scattering of a light subpath at its vertex number `j`, counted from the one on the light, and roulette by the part of
 /// the power that this vertex scatters. (By what is left of all power, as camera subpaths play it, `lattice` has 1.6 times
-/// the error at equal time by light tracing and 1.3 times by all techniques: what has got through many bounces is what
-/// counts there. `cornell-box` has 0.95 and 1.02 times.)
+/// the squared error at equal processor time by light tracing and 1.3 times by all techniques: what has got through many
+/// bounces is what counts there. `cornell-box` has 0.95 and 0.88 times. `relt render --method path --mapping light`, or
+/// `bidirectional`, `--mpp 20`, one seed.)
 ///
 /// Light goes from `wo` to the sampled direction, against the arguments of scattering functions: what counts is f(wi, wo).
 /// For perfect refraction that is f(wo, wi) times the square of the ratio of indices. Shading normals do not conserve

@@ -85,6 +85,9 @@ impl Tail {
 }
 
 impl Step {
+    /// A place to be filled.
+    pub const NOWHERE: Step = Step { density: 1.0, cos: 1.0, before: 0.0, shorter: 0.0 };
+
     /// Arrives at a vertex at the square of that distance; `cos` of the edge by its geometric normal.
     #[inline(always)]
     pub fn arrive(&self, distance2: f32, cos: f32) -> Tail {
