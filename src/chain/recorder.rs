@@ -2,7 +2,8 @@
 
 use crate::{
     film::{Footprint, Splat, Splats},
-    path::{FilmSplat, Whole},
+    path::{FilmSplat, Outcome, Whole},
+    scene::Rgb,
 };
 
 /// Writes the contributions of states into the splats of a block.
@@ -33,6 +34,22 @@ impl Recorder<'_> {
         self.add(layer, whole.main.splat(), value, weight);
         if !whole.elsewhere.is_empty() {
             self.add_all(elsewhere, whole.elsewhere, value);
+        }
+    }
+
+    /// Adds `weight` to the density at `film`, where an open point lies, and `value` · f of all its outcomes: of those that
+    /// are there to the first layer, of others to the second.
+    pub fn splat_outcomes(
+        &mut self,
+        [layer, elsewhere]: [usize; 2],
+        film: [f32; 2],
+        outcomes: &[Outcome],
+        value: impl Fn(usize) -> f64,
+        weight: f64,
+    ) {
+        self.add(layer, FilmSplat { film, rgb: Rgb::ZERO }, 0.0, weight);
+        for (i, outcome) in outcomes.iter().enumerate() {
+            self.add(if outcome.own { layer } else { elsewhere }, outcome.splat, value(i), 0.0);
         }
     }
 

@@ -42,6 +42,19 @@ pub trait Target: Sync {
     fn splats_elsewhere(&self) -> bool {
         false
     }
+
+    /// Whether points choose among [outcomes](crate::path::Outcome) that can be had all at once.
+    fn has_outcomes(&self) -> bool {
+        false
+    }
+
+    /// Lists all outcomes of the proposals of all lanes that do not rest in `out.outcomes`, with whatever the lanes choose
+    /// left open. What outcomes contribute sums to what points contribute on average over their choices, and those of
+    /// one lane are as many samples of what points are, each of weight `chance`, darkness making up for what these lack of 1
+    /// on average.
+    fn evaluate_open(&self, _: &mut Proposals, _: &mut Contributions, _: &mut Self::Workspace) {
+        unreachable!("points of this target have one outcome");
+    }
 }
 
 impl Target for Mapping<'_> {
@@ -49,6 +62,14 @@ impl Target for Mapping<'_> {
 
     fn splats_elsewhere(&self) -> bool {
         self.kind().splats_elsewhere()
+    }
+
+    fn has_outcomes(&self) -> bool {
+        Mapping::has_outcomes(self)
+    }
+
+    fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {
+        Mapping::evaluate_open(self, proposals, out, workspace);
     }
 
     fn changes_techniques(&self) -> bool {
@@ -131,6 +152,30 @@ impl<W: Default> Evaluator<W> {
 
     /// Draws and evaluates a proposal in every lane that does not rest; small steps start at `current`.
     pub fn evaluate<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points) {
+        self.with_proposals(current, |proposals, out, workspace| target.evaluate(proposals, out, workspace));
+        if let Some(importance) = &self.importance {
+            for (lane, how) in self.moves.iter().enumerate() {
+                if *how != Move::Rest {
+                    self.out.lanes[lane].ln_g = importance.ln_weighed(self.out.whole(lane));
+                }
+            }
+        }
+    }
+
+    /// The same, with what proposals choose left [open](Target::evaluate_open).
+    pub fn evaluate_open<T: Target<Workspace = W>>(&mut self, target: &T, current: &Points) {
+        self.with_proposals(current, |proposals, out, workspace| target.evaluate_open(proposals, out, workspace));
+        let Some(importance) = &self.importance else { return };
+        for (lane, how) in self.moves.iter().enumerate() {
+            if *how != Move::Rest {
+                for outcome in self.out.outcomes.of_mut(lane) {
+                    outcome.ln_g += importance.ln_at(outcome.splat.film);
+                }
+            }
+        }
+    }
+
+    fn with_proposals(&mut self, current: &Points, evaluate: impl FnOnce(&mut Proposals, &mut Contributions, &mut W)) {
         let mut proposals = Proposals {
             rng: self.rng,
             current,
@@ -140,13 +185,6 @@ impl<W: Default> Evaluator<W> {
             moves: &self.moves,
             film: self.film,
         };
-        target.evaluate(&mut proposals, &mut self.out, &mut self.workspace);
-        if let Some(importance) = &self.importance {
-            for (lane, how) in self.moves.iter().enumerate() {
-                if *how != Move::Rest {
-                    self.out.lanes[lane].ln_g = importance.ln_weighed(self.out.whole(lane));
-                }
-            }
-        }
+        evaluate(&mut proposals, &mut self.out, &mut self.workspace);
     }
 }

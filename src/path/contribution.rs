@@ -21,12 +21,14 @@ pub struct Contribution {
     /// ln g, the natural logarithm of the scalar contribution that chains follow: the luminance of f, weighed by an
     /// [`Importance`](crate::chain::Importance) where there is one; −∞ where that is 0; never NaN or +∞.
     pub ln_g: f64,
+    /// Probability of the choice that made the point what it is, where points choose among [`Outcome`]s; else 1.
+    pub chance: f32,
 }
 
 impl Contribution {
     /// No contribution: where chains are before their first state.
     pub const NONE: Contribution =
-        Contribution { film: [0.0; 2], rgb: Rgb::ZERO, luminance: 0.0, ln_g: f64::NEG_INFINITY };
+        Contribution { film: [0.0; 2], rgb: Rgb::ZERO, luminance: 0.0, ln_g: f64::NEG_INFINITY, chance: 1.0 };
 
     /// The contribution of radiance `rgb` at a film position and nothing elsewhere, and whether it had to be settled; see
     /// [`settle_whole`](Self::settle_whole).
@@ -58,7 +60,7 @@ impl Contribution {
 
     fn of(film: [f32; 2], rgb: Rgb, luminance: f32) -> Contribution {
         let ln_g = if luminance > 0.0 { libm::log(f64::from(luminance)) } else { f64::NEG_INFINITY };
-        Contribution { film, rgb, luminance, ln_g }
+        Contribution { film, rgb, luminance, ln_g, chance: 1.0 }
     }
 
     /// The luminance of all that the point contributes.
@@ -109,78 +111,112 @@ impl FilmSplat {
 }
 
 /// What the points of a batch give to the film elsewhere than at the position that their first dimensions name: light
-/// subpaths that the camera sees. Lists by lane; lanes of mappings that have no such thing cost nothing.
+/// subpaths that the camera sees.
+pub type Elsewhere = Lists<FilmSplat>;
+
+/// One of the things that a point may turn out to be, where points choose.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// What it adds to a place of the film if all outcomes are had at once. A point that chooses it adds that over
+    /// `chance`.
+    pub splat: FilmSplat,
+    /// Whether the place is the one that the point's first dimensions name.
+    pub own: bool,
+    /// Probability of the choice, over that of roulette having let the path be made, which points that choose do not
+    /// play; 0 for what no point can choose.
+    pub chance: f32,
+    /// ln g of a point that chooses it; −∞ where it contributes nothing or cannot be chosen.
+    pub ln_g: f64,
+}
+
+impl Outcome {
+    /// Settles the outcome as a [`Contribution`] is, and finds ln g for chains that follow the luminance. Returns the
+    /// number of values that were not finite.
+    pub fn settle(&mut self) -> u64 {
+        let (rgb, fault) = settled(self.splat.rgb);
+        self.splat.rgb = rgb;
+        self.ln_g = if rgb == Rgb::ZERO || self.chance == 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            libm::log(self.splat.luminance()) - libm::log(f64::from(self.chance))
+        };
+        u64::from(fault)
+    }
+}
+
+/// Lists by lane; lanes of mappings that have no such thing cost nothing.
 ///
 /// Memory is as large as the longest list asks for and then stays, so a batch that is warm allocates nothing.
 #[derive(Clone, Debug, Default)]
-pub struct Elsewhere {
-    /// Splats that a lane has room for.
+pub struct Lists<T> {
+    /// Items that a lane has room for.
     room: usize,
-    /// Number of splats by lane.
+    /// Number of items by lane.
     counts: Vec<u16>,
-    /// `splats[lane * room ..]`.
-    splats: Vec<FilmSplat>,
+    /// `items[lane * room ..]`.
+    items: Vec<T>,
 }
 
-impl Elsewhere {
+impl<T: Copy + Default> Lists<T> {
     /// Nothing, for `lanes` lanes.
-    pub fn new(lanes: usize) -> Elsewhere {
-        Elsewhere { room: 0, counts: vec![0; lanes], splats: Vec::new() }
+    pub fn new(lanes: usize) -> Lists<T> {
+        Lists { room: 0, counts: vec![0; lanes], items: Vec::new() }
     }
 
-    /// The splats of a lane.
+    /// The items of a lane.
     #[inline(always)]
-    pub fn of(&self, lane: usize) -> &[FilmSplat] {
+    pub fn of(&self, lane: usize) -> &[T] {
         let start = lane * self.room;
-        &self.splats[start..start + usize::from(self.counts[lane])]
+        &self.items[start..start + usize::from(self.counts[lane])]
     }
 
-    fn of_mut(&mut self, lane: usize) -> &mut [FilmSplat] {
+    /// The items of a lane, to be changed.
+    pub fn of_mut(&mut self, lane: usize) -> &mut [T] {
         let start = lane * self.room;
-        &mut self.splats[start..start + usize::from(self.counts[lane])]
+        &mut self.items[start..start + usize::from(self.counts[lane])]
     }
 
-    /// Forgets the splats of a lane.
+    /// Forgets the items of a lane.
     #[inline(always)]
     pub fn clear(&mut self, lane: usize) {
         self.counts[lane] = 0;
     }
 
-    /// Adds a splat to a lane.
+    /// Adds an item to a lane.
     #[inline]
-    pub fn push(&mut self, lane: usize, splat: FilmSplat) {
+    pub fn push(&mut self, lane: usize, item: T) {
         let count = usize::from(self.counts[lane]);
         self.reserve(count + 1);
-        self.splats[lane * self.room + count] = splat;
+        self.items[lane * self.room + count] = item;
         self.counts[lane] += 1;
     }
 
     /// Copies what lane `from` of `other` has to lane `to`.
     #[inline(always)]
-    pub fn copy(&mut self, to: usize, other: &Elsewhere, from: usize) {
-        let splats = other.of(from);
-        if splats.is_empty() {
+    pub fn copy(&mut self, to: usize, other: &Lists<T>, from: usize) {
+        let items = other.of(from);
+        if items.is_empty() {
             self.counts[to] = 0;
             return;
         }
-        self.reserve(splats.len());
+        self.reserve(items.len());
         let start = to * self.room;
-        self.splats[start..start + splats.len()].copy_from_slice(splats);
-        self.counts[to] = splats.len() as u16;
+        self.items[start..start + items.len()].copy_from_slice(items);
+        self.counts[to] = items.len() as u16;
     }
 
-    /// Makes room for `count` splats a lane.
+    /// Makes room for `count` items a lane.
     fn reserve(&mut self, count: usize) {
         if count <= self.room {
             return;
         }
         let room = count.next_power_of_two().max(4);
-        let mut splats = vec![FilmSplat::default(); room * self.counts.len()];
+        let mut items = vec![T::default(); room * self.counts.len()];
         for lane in 0..self.counts.len() {
             let own = self.of(lane);
-            splats[lane * room..lane * room + own.len()].copy_from_slice(own);
+            items[lane * room..lane * room + own.len()].copy_from_slice(own);
         }
-        (self.room, self.splats) = (room, splats);
+        (self.room, self.items) = (room, items);
     }
 }
 
@@ -208,6 +244,8 @@ pub struct Contributions {
     pub lanes: Vec<Contribution>,
     /// The rest of them.
     pub elsewhere: Elsewhere,
+    /// All outcomes of the points that were [evaluated openly](crate::chain::Target::evaluate_open).
+    pub outcomes: Lists<Outcome>,
     /// Rays traced since the counter was last taken.
     pub rays: u64,
     /// Contributions settled because they were not finite since the counter was last taken.
@@ -220,6 +258,7 @@ impl Contributions {
         Contributions {
             lanes: vec![Contribution::NONE; lanes],
             elsewhere: Elsewhere::new(lanes),
+            outcomes: Lists::new(lanes),
             rays: 0,
             non_finite: 0,
         }

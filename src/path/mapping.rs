@@ -92,6 +92,7 @@ pub struct Mapping<'s> {
     lengths: Lengths,
     technique_changes: bool,
     evaluate: Evaluate,
+    evaluate_open: Option<Evaluate>,
 }
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
@@ -129,10 +130,10 @@ impl<'s> Mapping<'s> {
     /// The mapping by a given kernel, which must do all that the scene needs.
     pub fn with_kernel(scene: &'s Scene, kind: MappingKind, widths: Widths, kernel: Kernel) -> Mapping<'s> {
         assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
-        let evaluate = match kernel {
-            Kernel::Diffuse => evaluate::<DiffuseProfile>(kind),
-            Kernel::Plain => evaluate::<PlainProfile>(kind),
-            Kernel::Full => evaluate::<FullProfile>(kind),
+        let (evaluate, open): (Evaluate, Evaluate) = match kernel {
+            Kernel::Diffuse => (evaluate::<DiffuseProfile>(kind), bidirectional::open::<DiffuseProfile>),
+            Kernel::Plain => (evaluate::<PlainProfile>(kind), bidirectional::open::<PlainProfile>),
+            Kernel::Full => (evaluate::<FullProfile>(kind), bidirectional::open::<FullProfile>),
         };
         let layout = Layout::new(&scene.features, kind == MappingKind::Multiplexed);
         Mapping {
@@ -143,6 +144,7 @@ impl<'s> Mapping<'s> {
             widths,
             technique_changes: false,
             evaluate,
+            evaluate_open: (kind == MappingKind::Multiplexed).then_some(open),
         }
     }
 
@@ -195,6 +197,18 @@ impl<'s> Mapping<'s> {
     /// Whether chains are to change techniques.
     pub fn technique_changes(&self) -> bool {
         self.technique_changes
+    }
+
+    /// Whether points choose among outcomes that can be had all at once.
+    pub fn has_outcomes(&self) -> bool {
+        self.evaluate_open.is_some()
+    }
+
+    /// Lists all outcomes of the proposals of all lanes that do not rest, whatever they choose: all techniques for the two
+    /// subpaths of each, at the cost of the bidirectional mapping.
+    pub fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
+        let evaluate = self.evaluate_open.expect("points of other mappings have one outcome");
+        evaluate(self, proposals, out, workspace);
     }
 
     /// Evaluates the proposals of all lanes that do not rest.

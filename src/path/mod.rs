@@ -12,7 +12,7 @@ mod tracing;
 mod unidirectional;
 mod vertex;
 
-pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Whole, luminance};
+pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Lists, Outcome, Whole, luminance};
 pub use layout::Layout;
 pub use mapping::{Mapping, MappingKind, Workspace};
 pub use tracing::{RecordedRays, Widths};

@@ -23,10 +23,12 @@ pub(super) struct Carried {
     pub pdf: f32,
     /// Product of the ratios of refractive indices, which roulette must not mistake for absorption.
     pub eta: f32,
+    /// Probability that roulette let the path come so far.
+    pub survival: f32,
 }
 
 impl Carried {
-    pub const START: Carried = Carried { throughput: Rgb::ONE, pdf: f32::INFINITY, eta: 1.0 };
+    pub const START: Carried = Carried { throughput: Rgb::ONE, pdf: f32::INFINITY, eta: 1.0, survival: 1.0 };
 }
 
 /// A light that is waiting for its shadow ray.
@@ -172,7 +174,7 @@ pub(super) fn scatter<P: Profile>(
 ) -> Option<Edge> {
     let ScatterSample { wi, weight, pdf, eta } =
         surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
-    let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta };
+    let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta, ..*carried };
     if let Some(u) = decisions.roulette {
         let left = match roulette {
             Roulette::Vertex => weight * (eta * eta),
@@ -183,6 +185,7 @@ pub(super) fn scatter<P: Profile>(
             return None;
         }
         next.throughput /= survival;
+        next.survival *= survival;
     }
     if next.throughput == Rgb::ZERO {
         return None;

@@ -31,6 +31,7 @@ impl ReplicaExchange {
             size: stage.size(),
             unit: f64::from(stage.mapping.scene().emitters.brightest()),
             elsewhere: stage.mapping.splats_elsewhere(),
+            outcomes: stage.mapping.has_outcomes(),
             evaluations: mutations,
         };
         ReplicaExchange { sampler: Sampler::new(setup) }

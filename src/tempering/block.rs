@@ -409,7 +409,11 @@ impl<W: Default> Part<W> {
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
         for at in self.replicas..evaluator.out.lanes.len() {
-            tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
+            if round.open {
+                tally.only_seen(evaluator.out.whole(at));
+            } else {
+                tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
+            }
         }
     }
 

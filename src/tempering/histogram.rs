@@ -60,11 +60,11 @@ impl Histogram {
     #[inline(always)]
     pub fn add(&mut self, ln_g: f64, weight: f64) {
         debug_assert!(!ln_g.is_nan() && weight >= 0.0, "ln g = {ln_g}, weight {weight}");
-        let steps = (weight * WEIGHT_STEPS + 0.5) as i64;
         if ln_g == f64::NEG_INFINITY {
-            self.dark = self.dark.saturating_add(steps);
+            self.add_dark(weight);
             return;
         }
+        let steps = (weight * WEIGHT_STEPS + 0.5) as i64;
         let in_bins = ln_g.clamp(-FARTHEST, FARTHEST) * BINS_PER_NAT as f64;
         let number = floor(in_bins);
         let offset = in_bins - (number as f64 + 0.5);
@@ -74,6 +74,13 @@ impl Histogram {
         let bin = &mut self.page(page)[number.rem_euclid(BINS_PER_NAT) as usize];
         bin.weight = bin.weight.saturating_add(steps);
         bin.moment = bin.moment.saturating_add((moment + 0.5f64.copysign(moment)) as i64);
+    }
+
+    /// Adds the weight of dark states, which may be taken away again: states of weights that sum to 1 only on average are
+    /// lit in part, and what is left of 1 is dark, be it less than nothing.
+    #[inline(always)]
+    pub fn add_dark(&mut self, weight: f64) {
+        self.dark = self.dark.saturating_add((weight * WEIGHT_STEPS).round() as i64);
     }
 
     /// The page of that number, made if need be.

@@ -18,6 +18,17 @@ const LANES: usize = 256;
 /// Parts of a pass that count for different groups.
 const QUARTERS: u64 = 4;
 
+/// What stratified points are drawn for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// For the image and, as long as there are none, to start chains from.
+    Image,
+    /// For the image, with what they choose left open.
+    OpenImage,
+    /// To start chains from, and no more.
+    Starts,
+}
+
 /// One block's share of the stratified points.
 pub struct Independent<W> {
     block: usize,
@@ -50,11 +61,12 @@ impl<W: Default> Independent<W> {
         }
     }
 
-    /// Evaluates and records the block's next `points` points; all blocks are asked for as many. `keep` is told of each.
+    /// Evaluates and records the block's next `points` points; all blocks are asked for as many. `keep` is told of each
+    /// that chose.
     pub fn sweep<T: Target<Workspace = W>>(
         &mut self,
         target: &T,
-        points: usize,
+        (points, purpose): (usize, Use),
         canvas: &Canvas,
         round: &Round,
         tally: &mut Tally,
@@ -73,10 +85,21 @@ impl<W: Default> Independent<W> {
             self.evaluator.moves[..lanes].fill(Move::Stratified);
             self.evaluator.moves[lanes..].fill(Move::Rest);
             self.evaluator.counters[..lanes].iter_mut().zip(&mut counters).for_each(|(c, next)| *c = next);
-            self.evaluator.evaluate(target, &self.nowhere);
+            if purpose == Use::OpenImage {
+                self.evaluator.evaluate_open(target, &self.nowhere);
+            } else {
+                self.evaluator.evaluate(target, &self.nowhere);
+            }
             for (lane, counter) in self.evaluator.counters[..lanes].iter().enumerate() {
                 let point = self.evaluator.out.whole(lane);
-                tally.uniform_point(canvas, round, point, true);
+                match purpose {
+                    Use::Image => tally.uniform_point(canvas, round, point, true),
+                    Use::Starts => tally.only_seen(point),
+                    Use::OpenImage => {
+                        tally.open_point(canvas, round, point.main.film, self.evaluator.out.outcomes.of(lane));
+                        continue;
+                    }
+                }
                 keep(Start { counter: *counter, ln_g: point.main.ln_g });
             }
             left -= lanes;

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Splats},
-    path::Whole,
+    path::{Outcome, Whole},
 };
 
 /// A layer of uniform points, of which every pixel is divided by the number of points that it got, with what points gave
@@ -212,6 +212,8 @@ pub struct Round {
     pub effort: [f64; 2],
     /// All uniform points are offered ones.
     pub only_offers: bool,
+    /// Stratified points leave open what they choose; the image has nothing of offered ones, which cannot.
+    pub open: bool,
     /// Sweep of the ladders at which the second half of the round begins.
     pub half: u64,
 }
@@ -261,6 +263,8 @@ pub struct Tally {
     even: Sum,
     /// The same as `hot` of tempered states, since ever.
     pub tempered: Sum,
+    /// S of the outcomes of one open point.
+    mixtures: Vec<f64>,
 }
 
 impl Tally {
@@ -274,6 +278,7 @@ impl Tally {
             hot: Sum::default(),
             even: Sum::default(),
             tempered: Sum::default(),
+            mixtures: Vec::new(),
         }
     }
 
@@ -312,6 +317,56 @@ impl Tally {
         }
     }
 
+    /// Records a uniform point that serves chains only, not the image.
+    pub fn only_seen(&mut self, point: Whole) {
+        self.histograms[0].add(point.main.ln_g, 1.0);
+    }
+
+    /// Records a stratified point at `film` that leaves its choice open, with all outcomes.
+    ///
+    /// Every outcome is weighed as a chain's state is that chooses it, so that the shares of both sum to one technique by
+    /// technique.
+    pub fn open_point(&mut self, canvas: &Canvas, round: &Round, film: [f32; 2], outcomes: &[Outcome]) {
+        let mut lit = 0.0;
+        for outcome in outcomes.iter().filter(|outcome| outcome.ln_g > f64::NEG_INFINITY) {
+            let chance = f64::from(outcome.chance);
+            self.histograms[0].add(outcome.ln_g, chance);
+            lit += chance;
+        }
+        self.histograms[0].add_dark(1.0 - lit);
+        self.mixtures.clear();
+        self.mixtures.extend(outcomes.iter().map(|outcome| match outcome.ln_g {
+            f64::NEG_INFINITY => 0.0,
+            ln_g => round.weights.mixture(ln_g),
+        }));
+        let mixtures = &self.mixtures;
+        let luminance: f64 = outcomes.iter().map(|outcome| outcome.splat.luminance()).sum();
+        self.even.add(luminance / canvas.unit, 1.0);
+        let size = canvas.size.map(|n| n as f32);
+        let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
+        let pair = |layer: PointLayer| [layer.own, layer.elsewhere.unwrap_or(layer.own)];
+        for layer in canvas.layers.uniform.into_iter().chain(canvas.layers.even) {
+            recorder.splat_outcomes(pair(layer), film, outcomes, |_| 1.0, 1.0);
+        }
+        if let Some(layer) = canvas.layers.hot {
+            let [effort, _] = round.effort;
+            let share = |i: usize| effort * round.weights.uniform(mixtures[i]);
+            recorder.splat_outcomes(pair(layer), film, outcomes, share, effort);
+            let sum: f64 = outcomes.iter().enumerate().map(|(i, outcome)| share(i) * outcome.splat.luminance()).sum();
+            self.counts[0].luminance += sum;
+            self.hot.add(sum / canvas.unit, effort);
+        }
+        if let Some(probe) = canvas.probe(film) {
+            Probes::uniform(&mut self.probes, probe, |_| 0.0, 0.0, 1.0);
+        }
+        for (outcome, mixture) in outcomes.iter().zip(mixtures) {
+            let Some(probe) = canvas.probe(outcome.splat.film) else { continue };
+            let g = outcome.splat.luminance();
+            let value = |ratio| g * round.weights.uniform_with(ratio, *mixture);
+            Probes::uniform(&mut self.probes, probe, value, round.weights.uniform_with(1.0, *mixture), 0.0);
+        }
+    }
+
     /// Records a state on tempered rung `k`, counted from 1, with its expected weight.
     #[inline(always)]
     pub fn state(&mut self, canvas: &Canvas, round: &Round, k: usize, state: Whole, weight: f64) {
@@ -337,7 +392,9 @@ impl Tally {
             let Some(probe) = canvas.probe(part.film) else { continue };
             let g = part.luminance();
             let value = |ratio| g * round.weights.tempered_with(ratio, mixture);
-            let uniform = |ratio| g * round.weights.uniform_with(ratio, mixture);
+            // where points leave their choice open, an outcome adds what it does times its chance, 1/chance times as often
+            let open = if round.open { f64::from(state.main.chance).sqrt() } else { 1.0 };
+            let uniform = |ratio| open * g * round.weights.uniform_with(ratio, mixture);
             let even = round.weights.tempered_with(1.0, mixture);
             Probes::tempered(&mut self.probes, probe, weight, value, uniform, even);
         }

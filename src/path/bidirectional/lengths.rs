@@ -73,6 +73,13 @@ impl Lengths {
         if edges == 1 { 1 } else { edges as u32 + 1 }
     }
 
+    /// Probability of choosing a technique; 0 for paths longer than any that are chosen.
+    #[inline(always)]
+    pub fn chance(&self, light: u16, camera: u16) -> f32 {
+        let edges = usize::from(light + camera) - 1;
+        if edges > self.cumulative.len() { 0.0 } else { self.probability(edges) / Self::techniques(edges) as f32 }
+    }
+
     /// A word that chooses technique `light` for paths of `edges` edges, uniform among all that do if `random` is uniform
     /// among all words.
     pub fn technique_word(&self, edges: usize, light: usize, random: u32) -> u32 {

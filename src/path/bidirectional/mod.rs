@@ -25,7 +25,7 @@ use subpath::{Arrival, CameraEnd, LightVertex, PLAIN, Particle, Site};
 use weights::Step;
 
 use super::{
-    Contribution, Contributions, FilmSplat, Mapping, Workspace,
+    Contribution, Contributions, FilmSplat, Mapping, Outcome, Workspace,
     tracing::{Kind, Tracing},
     vertex::{Carried, Connection, Decisions},
 };
@@ -75,6 +75,8 @@ struct Waiting {
     contributions: Vec<Rgb>,
     /// Positions of splats on the film; none for connections to camera subpaths.
     films: Vec<[f32; 2]>,
+    /// Chances of outcomes, where these are told apart.
+    chances: Vec<f32>,
     occluded: Vec<bool>,
 }
 
@@ -84,6 +86,7 @@ impl Waiting {
         self.lanes.clear();
         self.contributions.clear();
         self.films.clear();
+        self.chances.clear();
     }
 
     fn add(&mut self, lane: u32, connection: &Connection) {
@@ -107,6 +110,14 @@ impl Waiting {
     }
 }
 
+/// What becomes of the techniques.
+/// All are summed up.
+const SUM: u8 = 0;
+/// Points choose one of them.
+const ONE: u8 = 1;
+/// All are listed, each with the probability that a point chooses it.
+const OPEN: u8 = 2;
+
 /// All techniques of a batch.
 pub(super) fn evaluate<P: Profile>(
     mapping: &Mapping,
@@ -114,7 +125,7 @@ pub(super) fn evaluate<P: Profile>(
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    trace_both::<P, false>(mapping, proposals, out, workspace);
+    trace_both::<P, SUM>(mapping, proposals, out, workspace);
 }
 
 /// One technique for each point of a batch.
@@ -124,26 +135,36 @@ pub(super) fn multiplexed<P: Profile>(
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    trace_both::<P, true>(mapping, proposals, out, workspace);
+    trace_both::<P, ONE>(mapping, proposals, out, workspace);
 }
 
-fn trace_both<P: Profile, const ONE: bool>(
+/// All techniques of a batch of points that could choose one, each by itself.
+pub(super) fn open<P: Profile>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    out: &mut Contributions,
+    workspace: &mut Workspace,
+) {
+    trace_both::<P, OPEN>(mapping, proposals, out, workspace);
+}
+
+fn trace_both<P: Profile, const HOW: u8>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
     let Workspace { tracing, bidirectional: w, .. } = workspace;
-    begin::<ONE>(mapping, proposals, out, w);
-    follow_light::<P, ONE>(mapping, proposals, out, tracing, w);
+    begin::<HOW>(mapping, proposals, out, w);
+    follow_light::<P, HOW>(mapping, proposals, out, tracing, w);
     if mapping.kind().techniques().follow_camera() {
-        follow_camera::<P, ONE>(mapping, proposals, out, tracing, w);
+        follow_camera::<P, HOW>(mapping, proposals, out, tracing, w);
     }
-    settle(proposals, w, out);
+    if HOW == OPEN { settle_outcomes(proposals, w, out) } else { settle::<HOW>(proposals, w, out) }
 }
 
 /// Draws what is chosen for both subpaths, and forgets all lanes' past.
-fn begin<const ONE: bool>(mapping: &Mapping, proposals: &mut Proposals, out: &mut Contributions, w: &mut Arrays) {
+fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut Contributions, w: &mut Arrays) {
     proposals.begin(&mut w.live);
     proposals.draw(0, &w.live);
     if let Some(block) = mapping.layout().light_choices() {
@@ -157,7 +178,7 @@ fn begin<const ONE: bool>(mapping: &Mapping, proposals: &mut Proposals, out: &mu
     w.kept.clear();
     w.kept.resize(lanes, 0);
     w.mixtures.clear();
-    if ONE {
+    if HOW == ONE {
         w.chosen.resize(lanes, Chosen::NONE);
     }
     for &lane in &w.live {
@@ -165,14 +186,17 @@ fn begin<const ONE: bool>(mapping: &Mapping, proposals: &mut Proposals, out: &mu
         let [x, y, u, v] = proposals.block(0, at).map(unit_f32);
         (w.film[at], w.lens[at]) = ([x, y], [u, v]);
         out.elsewhere.clear(at);
-        if ONE && let Some(block) = mapping.layout().light_choices() {
+        if HOW == OPEN {
+            out.outcomes.clear(at);
+        }
+        if HOW == ONE && let Some(block) = mapping.layout().light_choices() {
             w.chosen[at] = mapping.lengths().choose(proposals.block(block, at));
         }
     }
 }
 
 /// Light subpaths: connects their vertices to the lens and keeps those that will be joined.
-fn follow_light<P: Profile, const ONE: bool>(
+fn follow_light<P: Profile, const HOW: u8>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -180,7 +204,7 @@ fn follow_light<P: Profile, const ONE: bool>(
     w: &mut Arrays,
 ) {
     let (scene, layout) = (mapping.scene(), mapping.layout());
-    start_at_light::<P, ONE>(mapping, proposals, out, tracing, w);
+    start_at_light::<P, HOW>(mapping, proposals, out, tracing, w);
     // a path through vertex number j has an edge more, to the lens
     for j in 1..layout.max_depth() {
         if w.lanes.is_empty() {
@@ -190,13 +214,13 @@ fn follow_light<P: Profile, const ONE: bool>(
         keep_hits(w);
         proposals.draw(layout.light_bounce(j - 1), &w.hit_lanes);
         w.waiting.clear();
-        scatter_light::<P, ONE>(mapping, j, proposals, w);
-        splat(mapping, tracing, w, out);
+        scatter_light::<P, HOW>(mapping, j, proposals, w);
+        splat::<HOW>(mapping, tracing, w, out);
     }
 }
 
 /// Starts a light subpath in every lane that has one, and connects the place where it starts to the lens.
-fn start_at_light<P: Profile, const ONE: bool>(
+fn start_at_light<P: Profile, const HOW: u8>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -204,7 +228,7 @@ fn start_at_light<P: Profile, const ONE: bool>(
     w: &mut Arrays,
 ) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
-    begin_subpaths::<ONE>(w, |chosen| chosen.light > 1);
+    begin_subpaths::<HOW>(w, |chosen| chosen.light > 1);
     proposals.draw(layout.emission(), &w.lanes);
     w.particles.clear();
     w.emissions.clear();
@@ -227,14 +251,14 @@ fn start_at_light<P: Profile, const ONE: bool>(
     }
     w.lanes.truncate(kept);
     if techniques.lamp {
-        splat(mapping, tracing, w, out);
+        splat::<HOW>(mapping, tracing, w, out);
     }
 }
 
 /// Lists the lanes that have a subpath of one kind, all of them where points do not choose, and forgets old rays.
-fn begin_subpaths<const ONE: bool>(w: &mut Arrays, has: impl Fn(&Chosen) -> bool) {
+fn begin_subpaths<const HOW: u8>(w: &mut Arrays, has: impl Fn(&Chosen) -> bool) {
     w.lanes.clear();
-    w.lanes.extend(w.live.iter().filter(|lane| !ONE || has(&w.chosen[**lane as usize])));
+    w.lanes.extend(w.live.iter().filter(|lane| HOW != ONE || has(&w.chosen[**lane as usize])));
     w.rays.clear();
     w.steps.resize(w.live.len(), Step::NOWHERE);
 }
@@ -260,10 +284,10 @@ fn keep_hits(w: &mut Arrays) {
 }
 
 /// At every hit of a light subpath: the lens to connect to, and the next edge, which replaces the one that led here.
-fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
+fn scatter_light<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
     let lanes = proposals.lanes();
-    let row = if ONE { 0 } else { usize::from(j - 1) * lanes };
+    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * lanes };
     if techniques.inner && w.vertices.len() < row + lanes {
         w.vertices.resize(row + lanes, LightVertex::NOWHERE);
     }
@@ -280,18 +304,21 @@ fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposa
             particle.arrive_after(&w.steps[i], origin, direction, &surface)
         };
         let site = Site::of(&surface);
-        let chosen = if ONE { w.chosen[at] } else { Chosen::NONE };
-        let last = ONE && chosen.light == j + 1;
-        if !ONE || last && chosen.camera == 1 {
+        let chosen = if HOW == ONE { w.chosen[at] } else { Chosen::NONE };
+        let last = HOW == ONE && chosen.light == j + 1;
+        if HOW != ONE || last && chosen.camera == 1 {
             let seen = connections::to_camera::<P>(scene, techniques, &arrival, &site, w.lens[at], j);
             if let Some(mut seen) = seen {
-                if ONE {
+                if HOW == ONE {
                     seen.connection.contribution *= chosen.scale;
                 }
                 w.waiting.add_splat(lane, &seen);
+                if HOW == OPEN {
+                    w.waiting.chances.push(mapping.lengths().chance(j + 1, 1) / arrival.survival);
+                }
             }
         }
-        if techniques.inner && (!ONE || last && chosen.camera > 1) {
+        if techniques.inner && (HOW != ONE || last && chosen.camera > 1) {
             let mixture = match &surface.scattering {
                 Scattering::Plain(_) => PLAIN,
                 Scattering::Mixed(mixture) => {
@@ -300,13 +327,13 @@ fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposa
                 }
             };
             w.vertices[row + at] = LightVertex::new(&surface, mixture, &arrival);
-            w.kept[at] = if ONE { 1 } else { j };
+            w.kept[at] = if HOW == ONE { 1 } else { j };
         }
         if last || j + 1 == layout.max_depth() {
             continue;
         }
         let block = proposals.block(layout.light_bounce(j - 1), at);
-        let decisions = Decisions::of_light(layout, j - 1, block, !ONE);
+        let decisions = Decisions::of_light(layout, j - 1, block, HOW != ONE);
         if let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) {
             w.lanes[kept] = lane;
             w.particles[kept] = edge.particle;
@@ -321,17 +348,22 @@ fn scatter_light<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposa
 }
 
 /// Traces the shadow rays of splats and puts those that are seen onto the lists of their lanes.
-fn splat(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays, out: &mut Contributions) {
+fn splat<const HOW: u8>(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays, out: &mut Contributions) {
     let waiting = &mut w.waiting;
     waiting.trace(mapping, tracing, out);
     for i in waiting.seen() {
         let splat = FilmSplat { film: waiting.films[i], rgb: waiting.contributions[i] };
-        out.elsewhere.push(waiting.lanes[i] as usize, splat);
+        let lane = waiting.lanes[i] as usize;
+        if HOW == OPEN {
+            out.outcomes.push(lane, Outcome { splat, own: false, chance: waiting.chances[i], ..Outcome::default() });
+        } else {
+            out.elsewhere.push(lane, splat);
+        }
     }
 }
 
 /// Camera subpaths: emission, next-event estimation and the vertices of light subpaths at each of their vertices.
-fn follow_camera<P: Profile, const ONE: bool>(
+fn follow_camera<P: Profile, const HOW: u8>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -339,14 +371,14 @@ fn follow_camera<P: Profile, const ONE: bool>(
     w: &mut Arrays,
 ) {
     let (scene, layout) = (mapping.scene(), mapping.layout());
-    start_at_camera::<ONE>(mapping, w);
+    start_at_camera::<HOW>(mapping, w);
     for j in 1..=layout.max_depth() {
         if w.lanes.is_empty() {
             break;
         }
         let kind = if j == 1 { Kind::Camera } else { Kind::Bounce };
         tracing.closest(scene, mapping.widths(), kind, &w.rays, &mut w.hits, out);
-        collect_background::<P, ONE>(mapping, j, w);
+        collect_background::<P, HOW>(mapping, j, w, out);
         keep_hits(w);
         if j < layout.max_depth() {
             proposals.draw(layout.bounce(j - 1), &w.hit_lanes);
@@ -355,17 +387,22 @@ fn follow_camera<P: Profile, const ONE: bool>(
             }
         }
         w.waiting.clear();
-        scatter_camera::<P, ONE>(mapping, j, proposals, w);
+        scatter_camera::<P, HOW>(mapping, j, proposals, w, out);
         w.waiting.trace(mapping, tracing, out);
         for i in w.waiting.seen() {
-            w.radiance[w.waiting.lanes[i] as usize] += w.waiting.contributions[i];
+            let (at, rgb) = (w.waiting.lanes[i] as usize, w.waiting.contributions[i]);
+            if HOW == OPEN {
+                out.outcomes.push(at, outcome(w.film[at], rgb, w.waiting.chances[i]));
+            } else {
+                w.radiance[at] += rgb;
+            }
         }
     }
 }
 
 /// Starts a camera subpath in every lane that has one.
-fn start_at_camera<const ONE: bool>(mapping: &Mapping, w: &mut Arrays) {
-    begin_subpaths::<ONE>(w, |chosen| chosen.camera > 1);
+fn start_at_camera<const HOW: u8>(mapping: &Mapping, w: &mut Arrays) {
+    begin_subpaths::<HOW>(w, |chosen| chosen.camera > 1);
     w.carried.clear();
     for &lane in &w.lanes {
         let ray = mapping.scene().camera.ray(w.film[lane as usize], w.lens[lane as usize]);
@@ -375,26 +412,44 @@ fn start_at_camera<const ONE: bool>(mapping: &Mapping, w: &mut Arrays) {
 }
 
 /// Adds the background to the paths that left the scene by their edge number `j`.
-fn collect_background<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, w: &mut Arrays) {
+fn collect_background<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    w: &mut Arrays,
+    out: &mut Contributions,
+) {
     if P::FLAT_MESHES || mapping.scene().emitters.surrounding_light().is_none() {
         return;
     }
     for i in 0..w.lanes.len() {
         let at = w.lanes[i] as usize;
-        if w.hits.geometry[i] != MISS || ONE && !w.chosen[at].is(0, j + 1) {
+        if w.hits.geometry[i] != MISS || HOW == ONE && !w.chosen[at].is(0, j + 1) {
             continue;
         }
         let tail = if j == 1 { subpath::STRAIGHT_OUT } else { w.steps[i].arrive_at_infinity() };
         let end = CameraEnd { carried: w.carried[i], tail };
         let techniques = mapping.kind().techniques();
         let radiance = connections::background::<P>(mapping.scene(), techniques, w.rays.direction(i), &end, j);
-        w.radiance[at] += if ONE { radiance * w.chosen[at].scale } else { radiance };
+        if HOW == OPEN {
+            if radiance != Rgb::ZERO {
+                let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
+                out.outcomes.push(at, outcome(w.film[at], radiance, chance));
+            }
+        } else {
+            w.radiance[at] += if HOW == ONE { radiance * w.chosen[at].scale } else { radiance };
+        }
     }
 }
 
 /// At every hit of a camera subpath, its vertex number `j`: emission, connections, and the next edge, which replaces the
 /// one that led here.
-fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
+fn scatter_camera<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    out: &mut Contributions,
+) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
     let lanes = proposals.lanes();
     let bounce = j - 1;
@@ -410,10 +465,18 @@ fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, propos
             w.steps[i].arrive((surface.p - origin).length_squared(), surface.ng.dot(direction).abs())
         };
         let end = CameraEnd { carried: w.carried[i], tail };
-        let chosen = if ONE { w.chosen[at] } else { Chosen::NONE };
-        let scale = if ONE { chosen.scale } else { 1.0 };
-        if !ONE || chosen.is(0, j + 1) {
-            w.radiance[at] += connections::hit::<P>(scene, techniques, &surface, (origin, direction), &end, j) * scale;
+        let chosen = if HOW == ONE { w.chosen[at] } else { Chosen::NONE };
+        let scale = if HOW == ONE { chosen.scale } else { 1.0 };
+        if HOW != ONE || chosen.is(0, j + 1) {
+            let radiance = connections::hit::<P>(scene, techniques, &surface, (origin, direction), &end, j);
+            if HOW == OPEN {
+                if radiance != Rgb::ZERO {
+                    let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
+                    out.outcomes.push(at, outcome(w.film[at], radiance, chance));
+                }
+            } else {
+                w.radiance[at] += radiance * scale;
+            }
         }
         if j == layout.max_depth() {
             continue;
@@ -421,28 +484,35 @@ fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, propos
         let choices = layout.choices(bounce).map(|block| proposals.block(block, at));
         let mut decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), at), choices);
         let site = Site::of(&surface);
-        if !ONE || chosen.is(1, j + 1) {
+        if HOW != ONE || chosen.is(1, j + 1) {
             let connection = connections::next_event::<P>(scene, techniques, &site, &end, &decisions, j);
             if let Some(mut connection) = connection {
                 connection.contribution *= scale;
                 w.waiting.add(lane, &connection);
+                if HOW == OPEN {
+                    w.waiting.chances.push(mapping.lengths().chance(1, j + 1) / end.carried.survival);
+                }
             }
         }
-        if techniques.inner && w.kept[at] > 0 && (!ONE || chosen.camera == j + 1) && site.scattering.is_smooth::<P>() {
+        if techniques.inner && w.kept[at] > 0 && (HOW != ONE || chosen.camera == j + 1) && site.scattering.is_smooth::<P>() {
             // as many edges as both subpaths have, and the one between
-            let longest = if ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
+            let longest = if HOW == ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
             for i in 1..=longest {
                 let vertex = &w.vertices[usize::from(i - 1) * lanes + at];
                 let light = vertex.site::<P>(scene, &w.mixtures);
-                let number = if ONE { chosen.light - 1 } else { i };
+                let number = if HOW == ONE { chosen.light - 1 } else { i };
                 let ends = ((&vertex.arrival, &light, number), (&end, &site, j));
                 if let Some(mut connection) = connections::join::<P>(techniques, ends.0, ends.1) {
                     connection.contribution *= scale;
                     w.waiting.add(lane, &connection);
+                    if HOW == OPEN {
+                        let survival = vertex.arrival.survival * end.carried.survival;
+                        w.waiting.chances.push(mapping.lengths().chance(i + 1, j + 1) / survival);
+                    }
                 }
             }
         }
-        if ONE {
+        if HOW == ONE {
             if chosen.camera == j + 1 {
                 continue;
             }
@@ -462,13 +532,33 @@ fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, propos
 }
 
 /// Turns radiances and splats into contributions and settles those that are not finite.
-fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
+fn settle<const HOW: u8>(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
             let (contribution, faults) =
                 Contribution::settle_whole(w.film[lane], w.radiance[lane], &mut out.elsewhere, lane);
             out.lanes[lane] = contribution;
+            if HOW == ONE && w.chosen[lane].scale > 0.0 {
+                out.lanes[lane].chance = 1.0 / w.chosen[lane].scale;
+            }
             out.non_finite += faults;
+        }
+    }
+}
+
+/// An outcome at the position that the point's first dimensions name.
+fn outcome(film: [f32; 2], rgb: Rgb, chance: f32) -> Outcome {
+    Outcome { splat: FilmSplat { film, rgb }, own: true, chance, ..Outcome::default() }
+}
+
+/// Settles outcomes that are not finite; the points themselves are dark.
+fn settle_outcomes(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
+    for (lane, m) in proposals.moves.iter().enumerate() {
+        if *m != Move::Rest {
+            out.lanes[lane] = Contribution { film: w.film[lane], ..Contribution::NONE };
+            for outcome in out.outcomes.of_mut(lane) {
+                out.non_finite += outcome.settle();
+            }
         }
     }
 }

@@ -50,7 +50,10 @@ pub fn evaluate<P: Profile>(
         point.follow_camera::<P>(&mut draw);
     }
     let Point { film, radiance, mut elsewhere, .. } = point;
-    let (contribution, faults) = Contribution::settle_whole(film, radiance, &mut elsewhere, 0);
+    let (mut contribution, faults) = Contribution::settle_whole(film, radiance, &mut elsewhere, 0);
+    if let Some(chosen) = chosen {
+        contribution.chance = 1.0 / chosen.scale;
+    }
     (contribution, elsewhere, faults)
 }
 

@@ -83,7 +83,7 @@ impl LightVertex {
         wo: Vec3::Z,
         appearance: 0,
         mixture: PLAIN,
-        arrival: Arrival { flux: Rgb::ZERO, tail: STRAIGHT_OUT },
+        arrival: Arrival { flux: Rgb::ZERO, tail: STRAIGHT_OUT, survival: 1.0 },
     };
 
     /// The place, with its scattering function from wherever it is.
@@ -104,6 +104,8 @@ impl LightVertex {
 pub(super) struct Particle {
     /// Emitted power over all densities so far, times all reflectances.
     pub flux: Rgb,
+    /// Probability that roulette let it come so far.
+    pub survival: f32,
 }
 
 /// A light subpath at its last vertex.
@@ -113,6 +115,8 @@ pub(super) struct Arrival {
     /// leaves.
     pub flux: Rgb,
     pub tail: Tail,
+    /// Probability that roulette let it come so far.
+    pub survival: f32,
 }
 
 /// Cosines that fluxes are divided by are kept from 0.
@@ -121,12 +125,12 @@ const LEAST_COSINE: f32 = 1e-9;
 impl Particle {
     #[inline(always)]
     fn arrive(&self, cos: f32, tail: Tail) -> Arrival {
-        Arrival { flux: self.flux / cos.max(LEAST_COSINE), tail }
+        Arrival { flux: self.flux / cos.max(LEAST_COSINE), tail, survival: self.survival }
     }
 
     /// At the start, `flux` being that of the emission.
     pub fn new(flux: Rgb) -> Particle {
-        Particle { flux }
+        Particle { flux, survival: 1.0 }
     }
 
     /// Arrives at the first vertex after the light.
@@ -224,7 +228,7 @@ pub(super) fn scatter_light<P: Profile>(
         let there = site.scattering.evaluate::<P>(sample.wi, site.wo);
         (there.value / sample.pdf, Some([sample.pdf, there.pdf]))
     };
-    let mut particle = Particle { flux: arrival.flux * weight * cos };
+    let mut particle = Particle { flux: arrival.flux * weight * cos, survival: arrival.survival };
     if let Some(u) = decisions.roulette {
         // the part of what arrived that leaves: both fluxes, but for the cosine that one of them was divided by
         let cos_before = site.cos(site.frame.to_world(site.wo)).max(LEAST_COSINE);
@@ -233,6 +237,7 @@ pub(super) fn scatter_light<P: Profile>(
             return None;
         }
         particle.flux /= survival;
+        particle.survival *= survival;
     }
     if particle.flux == Rgb::ZERO {
         return None;

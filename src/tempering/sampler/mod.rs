@@ -22,7 +22,7 @@ use learnt::Luminance;
 use super::{
     Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round,
     RoundReport, Sum, Tally, Weights,
-    independent::Independent,
+    independent::{Independent, Use},
     probes::TRIALS,
     steps::{self, StepCount},
     tuning::Choice,
@@ -36,6 +36,8 @@ use crate::{
 /// Uniform points before chains start, and before that where it is to be learnt where chains are wanted; a 32nd of the
 /// run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
+/// The same of open points, which are those of many choices, where it is to be learnt where chains are wanted.
+const OPEN_BOOTSTRAP: u64 = 1 << 14;
 /// Ladders longer than 64 rungs get fewer blocks, with no more rungs together than this: each block has histograms for
 /// each rung, of some ten kilobytes.
 const RUNGS_OF_ALL_BLOCKS: usize = 4096;
@@ -76,8 +78,12 @@ pub struct Sampler<W> {
     bootstrap: u64,
     /// Uniform points so far: those that came in the order of pixels, and those offered to ladders.
     points: [u64; 2],
-    /// Rays of a uniform point, as the first sweeps had them.
-    rays_a_point: f64,
+    /// Whether stratified points leave open what they choose.
+    open: bool,
+    /// Stratified points so far and their rays: of those that chose, and of open ones.
+    uniform_rays: [[u64; 2]; 2],
+    /// Rays of a point that chose and of an open one, as the first sweeps had them.
+    rays_a_point: [f64; 2],
     sweeps: u64,
     evaluations: u64,
     wanted: Option<u64>,
@@ -160,6 +166,8 @@ pub struct Setup {
     /// Whether points may contribute elsewhere than at their own film positions, as [`Target::splats_elsewhere`] says;
     /// that takes further layers of the film.
     pub elsewhere: bool,
+    /// Whether points choose among outcomes that can be had all at once, as [`Target::has_outcomes`] says.
+    pub outcomes: bool,
     /// Evaluations to go through; without end where absent.
     pub evaluations: Option<u64>,
 }
@@ -167,7 +175,7 @@ pub struct Setup {
 impl<W: Default + Send> Sampler<W> {
     /// Ready to start.
     pub fn new(setup: Setup) -> Sampler<W> {
-        let Setup { rng, choices, footprint, size, unit, elsewhere, evaluations } = setup;
+        let Setup { rng, choices, footprint, size, unit, elsewhere, outcomes, evaluations } = setup;
         let most_rungs = match &choices.ladder {
             LadderChoice::Auto => MOST_AUTOMATIC,
             LadderChoice::Replicas(k) => *k as usize,
@@ -201,8 +209,9 @@ impl<W: Default + Send> Sampler<W> {
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
         let only_uniform = most_rungs == 1;
-        let length =
-            if only_uniform { u64::MAX } else { at_most(BOOTSTRAP, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
+        let open = outcomes && learns && std::env::var("RELT_CLOSED").is_err();
+        let first = if open && choices.measure == Measure::Relative { OPEN_BOOTSTRAP } else { BOOTSTRAP };
+        let length = if only_uniform { u64::MAX } else { at_most(first, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
         Sampler {
             rng,
             screen,
@@ -213,6 +222,7 @@ impl<W: Default + Send> Sampler<W> {
                 mixes: [(); TRIALS].map(|()| Vec::new()),
                 effort: [1.0, 0.0],
                 only_offers: false,
+                open,
                 half: u64::MAX,
             },
             schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },
@@ -229,7 +239,9 @@ impl<W: Default + Send> Sampler<W> {
             image_correlation: None,
             bootstrap: 0,
             points: [0; 2],
-            rays_a_point: 0.0,
+            open,
+            uniform_rays: [[0; 2]; 2],
+            rays_a_point: [0.0; 2],
             sweeps: 0,
             reports: Vec::new(),
             effort: 0.0,
@@ -301,6 +313,11 @@ impl<W: Default + Send> Sampler<W> {
     fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
         let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
+        let purpose = match self.open {
+            true if keeps && !(self.weighs() && self.importance.is_none()) => Use::Starts,
+            true => Use::OpenImage,
+            false => Use::Image,
+        };
         let half = usize::from(schedule.done >= schedule.middle());
         self.portions.par_iter_mut().for_each(|portion| {
             let canvas = screen.canvas();
@@ -314,7 +331,7 @@ impl<W: Default + Send> Sampler<W> {
                         starts.push(start);
                     }
                 };
-                uniform.sweep(target, schedule.points, &canvas, round, tally, keep);
+                uniform.sweep(target, (schedule.points, purpose), &canvas, round, tally, keep);
             }
             uniform.settle(&canvas, tally);
             tally.deposit(&canvas, half, None);
@@ -322,15 +339,23 @@ impl<W: Default + Send> Sampler<W> {
                 block.deposit(&canvas);
             }
         });
+        let drawn = sweeps * (self.portions.len() * self.schedule.points) as u64;
+        let uniform_rays = &mut self.uniform_rays[usize::from(purpose == Use::OpenImage)];
+        uniform_rays[0] += drawn;
         for portion in &mut self.portions {
             let [uniform, faults] = portion.uniform.take_rays_and_faults();
+            uniform_rays[1] += uniform;
             let [ladders, more] = portion.ladders.as_mut().map_or([0; 2], Block::take_rays_and_faults);
             self.rays += uniform + ladders;
             self.non_finite += faults + more;
             self.ladder_rays += ladders;
         }
-        self.points[0] += sweeps * (self.portions.len() * self.schedule.points) as u64;
-        self.points[1] += sweeps * schedule.ladder_sweeps * self.ladders() * self.offers as u64;
+        if purpose != Use::Starts {
+            self.points[0] += drawn;
+        }
+        if !self.open {
+            self.points[1] += sweeps * schedule.ladder_sweeps * self.ladders() * self.offers as u64;
+        }
         self.sweeps += sweeps;
         let evaluations = sweeps * self.a_sweep();
         self.evaluations += evaluations;

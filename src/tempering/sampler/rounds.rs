@@ -102,7 +102,9 @@ impl<W: Default + Send> Sampler<W> {
         }
         self.importance = Some(importance);
         self.screen.groups.forget_histograms();
-        self.schedule.length += self.schedule.done;
+        let a_sweep = self.a_sweep();
+        self.schedule.length =
+            self.schedule.done + at_most(super::BOOTSTRAP, self.wanted, 1.0 / 32.0).div_ceil(a_sweep);
     }
 
     /// Records what states have gathered; the round's settings still hold.
@@ -198,9 +200,9 @@ impl<W: Default + Send> Sampler<W> {
         self.ladders_a_block = ladders;
         self.screen.layers = self.screen.prepared;
         self.bootstrap = self.points[0];
-        self.rays_a_point = self.rays as f64 / self.evaluations as f64;
-        self.choice =
-            Choice { ratio: FIRST_RATIO, share: self.choices.uniform_share.unwrap_or(0.5), relative_error: f64::NAN };
+        self.rays_a_point = self.uniform_rays.map(|[points, rays]| rays as f64 / (points as f64).max(1.0));
+        let share = self.choices.uniform_share.unwrap_or_else(|| self.share_of_evaluations(0.5));
+        self.choice = Choice { ratio: FIRST_RATIO, share, relative_error: f64::NAN };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
             LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
@@ -284,6 +286,18 @@ impl<W: Default + Send> Sampler<W> {
         })
     }
 
+    /// The share of evaluations that are uniform points, where these have that share of the cost, as far as it is known. Where
+    /// points that choose are alike on all rungs, shares of cost are taken for those of evaluations.
+    fn share_of_evaluations(&self, of_cost: f64) -> f64 {
+        if !self.open {
+            return of_cost;
+        }
+        let [chosen, open] = self.rays_a_point.map(|rays| rays + COST_BESIDE_RAYS);
+        let chain = chosen * (1.0 + self.offers as f64 / self.round.ladder.chains() as f64);
+        let (points, states) = (of_cost / open, (1.0 - of_cost) / chain);
+        points / (points + states)
+    }
+
     /// Uniform points a sweep for each ladder of `chains` chains, by the share that is chosen.
     fn uniform_a_ladder(&self, chains: usize) -> f64 {
         chains as f64 * self.choice.share / (1.0 - self.choice.share)
@@ -304,7 +318,8 @@ impl<W: Default + Send> Sampler<W> {
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
             _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
         };
-        let shares = self.choices.uniform_share.map_or(LEAST_UNIFORM..=most, |share| share..=share);
+        let [least, most] = [LEAST_UNIFORM, most].map(|share| self.share_of_evaluations(share));
+        let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
         self.measured(learnt).map(|measured| measured.choose(&shares))
     }
 
@@ -331,8 +346,14 @@ impl<W: Default + Send> Sampler<W> {
     /// Cost of a uniform point and of a step of a chain, in rays.
     fn costs(&self, states: f64) -> [f64; 2] {
         let offered = self.ladder_steps(self.schedule.done) as f64 * self.offers as f64;
-        let a_state = (self.ladder_rays as f64 - offered * self.rays_a_point).max(0.0) / states.max(1.0);
-        [self.rays_a_point + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
+        let [chosen, open] = self.rays_a_point;
+        if self.open {
+            // offered points add nothing to the image: chains bear their cost
+            let a_state = (self.ladder_rays as f64 + offered * COST_BESIDE_RAYS) / states.max(1.0);
+            return [open + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS];
+        }
+        let a_state = (self.ladder_rays as f64 - offered * chosen).max(0.0) / states.max(1.0);
+        [chosen + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
     }
 
     /// Places rungs at equal rejection, unless they are near enough.
@@ -378,7 +399,8 @@ impl<W: Default + Send> Sampler<W> {
         if ladders > 0 {
             let ln_zeta: Vec<f64> =
                 self.round.ladder.betas().iter().map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) }).collect();
-            let a_sweep = self.uniform_a_ladder(self.round.ladder.chains()) - self.offers as f64;
+            let offered = if self.open { 0.0 } else { self.offers as f64 };
+            let a_sweep = self.uniform_a_ladder(self.round.ladder.chains()) - offered;
             let points = a_sweep.max(0.0) * self.ladders_a_block as f64;
             self.schedule.ladder_sweeps = if points < 1.0 { 1 } else { (BATCH / points).ceil().max(1.0) as u64 };
             self.schedule.points = (points * self.schedule.ladder_sweeps as f64).round() as usize;
@@ -409,7 +431,10 @@ impl<W: Default + Send> Sampler<W> {
         let evaluations = match (self.schedule.round, self.schedule.frozen) {
             (1, _) => {
                 let pixels = u64::from(self.screen.size[0]) * u64::from(self.screen.size[1]);
-                at_most(FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels), self.wanted, LEARNING_PART / 4.0)
+                let first = FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels);
+                // both halves need a stratified point in every pixel
+                let passes = if self.open { (2.0 * pixels as f64 / self.uniform_share()) as u64 } else { 0 };
+                at_most(first, self.wanted, LEARNING_PART / 4.0).max(at_most(passes, self.wanted, LEARNING_PART))
             }
             (_, false) => 2 * self.schedule.evaluations,
             // as long as all that came before
@@ -425,7 +450,7 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Uniform points of a block in a sweep, offered or not.
     pub(super) fn points_a_block(&self) -> usize {
-        let ladders = if self.ladders() > 0 { self.ladders_a_block } else { 0 };
+        let ladders = if self.ladders() > 0 && !self.open { self.ladders_a_block } else { 0 };
         self.offers * ladders * self.schedule.ladder_sweeps as usize + self.schedule.points
     }
 
@@ -492,6 +517,7 @@ mod tests {
             size: [2, 2],
             unit: 1.0,
             elsewhere: true,
+            outcomes: false,
             evaluations: Some(1 << 17),
         });
         while sampler.importance.is_none() {
