@@ -72,6 +72,7 @@ impl Ladders {
             mixes: std::array::from_fn(|_| vec![StepMix::about(STEPS); rungs]),
             effort: [1.0; 2],
             only_offers: true,
+            open: false,
             half: u64::MAX,
             ladder,
         };

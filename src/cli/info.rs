@@ -10,7 +10,7 @@ use super::scene::{Opened, SceneArguments};
 use crate::embree::{Device, Scene as Tracer};
 use crate::film::{Accumulator, Filter, PixelFormat};
 use crate::path::{Layout, MappingKind};
-use crate::render::trial;
+use crate::render::{Method, trial};
 use crate::scene::description::FilmDescription;
 use crate::scene::{Appearance, Features, Kernel, Scene, materials};
 use crate::tempering::{Choices, Layers};
@@ -171,7 +171,9 @@ fn mappings(features: &Features) -> Vec<String> {
     let names = |kinds: &[MappingKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
     let (whole, part): (Vec<_>, Vec<_>) =
         MappingKind::ALL.into_iter().partition(|kind| kind.misses(features).is_empty());
-    let mut lines = vec![format!("{}; auto tries {}", names(&whole), names(&trial::candidates(features)))];
+    let candidates: Vec<MappingKind> =
+        trial::candidates(features, Method::ReplicaExchange).iter().map(|candidate| candidate.kind).collect();
+    let mut lines = vec![format!("{}; auto tries {}", names(&whole), names(&candidates))];
     lines.extend(
         part.iter()
             .map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),

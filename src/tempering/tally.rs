@@ -448,6 +448,7 @@ mod tests {
             mixes: std::array::from_fn(|_| Vec::new()),
             effort: [2.0, 0.5],
             only_offers: false,
+            open: false,
             half: u64::MAX,
         };
         let mut elsewhere = Elsewhere::new(1);

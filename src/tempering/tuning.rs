@@ -53,14 +53,15 @@ pub struct Choice {
 
 impl Measured {
     /// The best choice within the shares that are free; path tracing where chains do not promise to be better by far.
-    pub fn choose(&self, shares: &RangeInclusive<f64>) -> Choice {
+    /// Where nothing was measured uniform points get the share `unmeasured`.
+    pub fn choose(&self, shares: &RangeInclusive<f64>, unmeasured: f64) -> Choice {
         let importances = self.importances();
         let [cost_u, cost_t] = self.cost;
         let path = self.variances(0, &importances)[0] * cost_u;
         let most = *shares.end();
         if path == 0.0 {
-            // no noise at all, as of a constant: nothing to choose by
-            return Choice { ratio: RATIOS[RATIOS.len() - 2], share: most.min(0.5), relative_error: 1.0 };
+            // no noise at all, as of a constant, or too few points to see any: nothing to choose by
+            return Choice { ratio: RATIOS[RATIOS.len() - 2], share: most.min(unmeasured), relative_error: 1.0 };
         }
         let error = if most >= 1.0 { PROMISE } else { f64::INFINITY };
         let mut best = Choice { ratio: 0.0, share: 1.0, relative_error: error };

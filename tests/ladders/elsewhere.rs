@@ -5,7 +5,7 @@ use rayon::{ThreadPoolBuilder, prelude::*};
 use relt::{
     chain::{LargeSteps, Measure, Target},
     film::{Filter, Footprint, Image, Plane},
-    path::{Contribution, Contributions, FilmSplat},
+    path::{Contribution, Contributions, FilmSplat, Outcome},
     rng::{Rng, unit_f32},
     sample::Proposals,
     scene::Rgb,
@@ -85,6 +85,91 @@ impl Target for Scattered {
     }
 }
 
+/// A target of the same image, whose points choose what they light: red, green, or blue in either way.
+///
+/// Open points have all of that at once, red after a roulette that points which choose do not play.
+pub struct Choosing;
+
+impl Choosing {
+    /// Probabilities of the choices.
+    const CHANCES: [f32; 4] = [0.4, 0.3, 0.2, 0.1];
+    /// Probability that roulette leaves open points their red.
+    const SURVIVAL: f32 = 0.5;
+
+    /// Where and what is lit by each choice, and the first block's place.
+    fn lit(proposals: &mut Proposals, lane: usize) -> ([f32; 2], [FilmSplat; 4]) {
+        let [x, y, u, v] = proposals.block(0, lane).map(unit_f32);
+        let [w, t, _, s] = proposals.block(1, lane).map(unit_f32);
+        let splat = |p: f32, q: f32, rgb| FilmSplat { film: [p, q], rgb };
+        let lit = [
+            splat(x, y, Rgb::new(Scattered::own(x, y), 0.0, 0.0)),
+            splat(u, v, Rgb::new(0.0, Scattered::spot(u, v), 0.0)),
+            splat(w, s, Rgb::new(0.0, 0.0, 2.0 * s)),
+            splat(t.sqrt(), s, Rgb::new(0.0, 0.0, 1.0)),
+        ];
+        ([x, y], lit)
+    }
+
+    fn draw(proposals: &mut Proposals, live: &mut Vec<u32>) {
+        proposals.begin(live);
+        (0..3).for_each(|block| proposals.draw(block, live));
+    }
+}
+
+impl Target for Choosing {
+    type Workspace = Vec<u32>;
+
+    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, live: &mut Vec<u32>) {
+        Choosing::draw(proposals, live);
+        for &lane in &*live {
+            let lane = lane as usize;
+            let (film, lit) = Choosing::lit(proposals, lane);
+            let [choice, ..] = proposals.block(2, lane).map(unit_f32);
+            let chosen = [0.4, 0.7, 0.9].into_iter().position(|end| choice < end).unwrap_or(3);
+            let FilmSplat { film: place, rgb } = lit[chosen];
+            let rgb = rgb / Choosing::CHANCES[chosen];
+            out.elsewhere.clear(lane);
+            if chosen > 0 {
+                out.elsewhere.push(lane, FilmSplat { film: place, rgb });
+            }
+            let own = if chosen == 0 { rgb } else { Rgb::ZERO };
+            let (whole, faults) = Contribution::settle_whole(film, own, &mut out.elsewhere, lane);
+            out.lanes[lane] = Contribution { chance: Choosing::CHANCES[chosen], ..whole };
+            out.non_finite += faults;
+        }
+    }
+
+    fn splats_elsewhere(&self) -> bool {
+        true
+    }
+
+    fn has_outcomes(&self) -> bool {
+        true
+    }
+
+    fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, live: &mut Vec<u32>) {
+        Choosing::draw(proposals, live);
+        for &lane in &*live {
+            let lane = lane as usize;
+            let (film, lit) = Choosing::lit(proposals, lane);
+            let [_, roulette, ..] = proposals.block(2, lane).map(unit_f32);
+            out.outcomes.clear(lane);
+            out.lanes[lane] = Contribution { film, ..Contribution::NONE };
+            for (i, splat) in lit.into_iter().enumerate() {
+                let survival = if i == 0 { Choosing::SURVIVAL } else { 1.0 };
+                if i == 0 && roulette >= survival {
+                    continue;
+                }
+                let splat = FilmSplat { rgb: splat.rgb / survival, ..splat };
+                let chance = Choosing::CHANCES[i] / survival;
+                let mut outcome = Outcome { splat, own: i == 0, chance, ..Outcome::default() };
+                out.non_finite += outcome.settle();
+                out.outcomes.push(lane, outcome);
+            }
+        }
+    }
+}
+
 const SIZE: [u32; 2] = [6, 4];
 const EVALUATIONS: u64 = 1 << 15;
 const RUNS: u64 = 16;
@@ -128,7 +213,7 @@ fn agrees(images: &[Vec<f64>], truth: &[f64], tolerance: f64, case: &str) {
     );
 }
 
-fn sampler(choices: &Choices, filter: Filter, seed: u64) -> Sampler<Vec<u32>> {
+fn sampler(target: &impl Target, choices: &Choices, filter: Filter, seed: u64) -> Sampler<Vec<u32>> {
     Sampler::new(Setup {
         rng: Rng::new(seed),
         choices: choices.clone(),
@@ -136,15 +221,21 @@ fn sampler(choices: &Choices, filter: Filter, seed: u64) -> Sampler<Vec<u32>> {
         size: SIZE,
         unit: 1.0,
         elsewhere: true,
+        outcomes: target.has_outcomes(),
         evaluations: Some(EVALUATIONS),
     })
 }
 
 /// The image and the further layers of a whole run.
-fn run(choices: &Choices, filter: Filter, seed: u64) -> (Image, Vec<(String, Plane)>) {
-    let mut sampler = sampler(choices, filter, seed);
+fn run(
+    target: &impl Target<Workspace = Vec<u32>>,
+    choices: &Choices,
+    filter: Filter,
+    seed: u64,
+) -> (Image, Vec<(String, Plane)>) {
+    let mut sampler = sampler(target, choices, filter, seed);
     while sampler.sweeps_left() != Some(0) {
-        sampler.advance(&Scattered, u64::MAX, None);
+        sampler.advance(target, u64::MAX, None);
     }
     let developed = sampler.develop();
     (developed.image, developed.layers)
@@ -155,9 +246,14 @@ fn values(image: &Image) -> Vec<f64> {
 }
 
 /// An image of each run: the picture itself, or a layer of that name.
-fn images(choices: &Choices, filter: Filter, layer: Option<&str>) -> Vec<Vec<f64>> {
+fn images(
+    target: &impl Target<Workspace = Vec<u32>>,
+    choices: &Choices,
+    filter: Filter,
+    layer: Option<&str>,
+) -> Vec<Vec<f64>> {
     let image = |seed| {
-        let (image, layers) = run(choices, filter, seed);
+        let (image, layers) = run(target, choices, filter, seed);
         let Some(name) = layer else { return values(&image) };
         match layers.into_iter().find(|layer| layer.0 == name) {
             Some((_, Plane::Rgb(image))) => values(&image),
@@ -185,7 +281,39 @@ fn images_of_path_tracing_and_of_ladders_agree_with_the_integrals() {
     for filter in FILTERS {
         let truth = truth(filter);
         for (name, choices) in &cases {
-            agrees(&images(choices, filter, None), &truth, 0.003, &format!("{name}, {filter:?}"));
+            agrees(&images(&Scattered, choices, filter, None), &truth, 0.003, &format!("{name}, {filter:?}"));
+        }
+    }
+}
+
+/// 16 runs a case; twelve cases, level 0.005 together.
+#[test]
+fn images_of_points_that_choose_agree_with_the_integrals() {
+    let relative = Choices { measure: Measure::Relative, ..replicas(4, Combine::Balance) };
+    let cases = [
+        ("path tracing", replicas(1, Combine::Balance)),
+        ("K = 2", replicas(2, Combine::Balance)),
+        ("K = 4", replicas(4, Combine::Balance)),
+        ("K = 4, relative error", relative),
+        ("auto", automatic()),
+        ("K = 4, target", replicas(4, Combine::Target)),
+    ];
+    for filter in FILTERS {
+        let truth = truth(filter);
+        for (name, choices) in &cases {
+            agrees(&images(&Choosing, choices, filter, None), &truth, 0.003, &format!("{name}, {filter:?}"));
+        }
+    }
+}
+
+/// 16 runs a case; four cases, level 0.002 together.
+#[test]
+fn layers_beside_an_image_of_open_points_agree_with_the_integrals() {
+    let choices = Choices { layers: true, ..replicas(3, Combine::Balance) };
+    for filter in FILTERS {
+        let truth = truth(filter);
+        for name in ["uniform", "target"] {
+            agrees(&images(&Choosing, &choices, filter, Some(name)), &truth, 0.003, &format!("{name}, {filter:?}"));
         }
     }
 }
@@ -197,7 +325,12 @@ fn layers_beside_the_image_agree_with_the_integrals() {
     for filter in FILTERS {
         let truth = truth(filter);
         for name in ["uniform", "target"] {
-            agrees(&images(&choices, filter, Some(name)), &truth, 0.003, &format!("layer {name}, {filter:?}"));
+            agrees(
+                &images(&Scattered, &choices, filter, Some(name)),
+                &truth,
+                0.003,
+                &format!("layer {name}, {filter:?}"),
+            );
         }
     }
 }
@@ -223,8 +356,15 @@ fn images_of_the_baseline_agree_with_the_integrals() {
 #[test]
 fn parts_of_all_rungs_sum_to_the_image() {
     for filter in FILTERS {
+        parts_sum(&Scattered, filter);
+        parts_sum(&Choosing, filter);
+    }
+}
+
+fn parts_sum(target: &impl Target<Workspace = Vec<u32>>, filter: Filter) {
+    {
         let choices = Choices { layers: true, ..replicas(3, Combine::Balance) };
-        let (image, layers) = run(&choices, filter, 3);
+        let (image, layers) = run(target, &choices, filter, 3);
         let parts: Vec<Vec<f64>> = layers
             .iter()
             .filter(|layer| layer.0.starts_with("rung"))
@@ -245,7 +385,7 @@ fn parts_of_all_rungs_sum_to_the_image() {
 #[test]
 fn a_sample_counts_once_in_the_density() {
     for choices in [replicas(1, Combine::Balance), replicas(1, Combine::Uniform)] {
-        let mut sampler = sampler(&choices, Filter::Box, 1);
+        let mut sampler = sampler(&Scattered, &choices, Filter::Box, 1);
         while sampler.sweeps_left() != Some(0) {
             sampler.advance(&Scattered, u64::MAX, None);
         }
@@ -261,7 +401,7 @@ fn threads_do_not_change_a_bit() {
     for choices in [automatic(), Choices::default(), replicas(3, Combine::Balance), replicas(40, Combine::Power)] {
         let [one, two] = [1, 2].map(|threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let (image, _) = pool.install(|| run(&choices, FILTERS[1], 7));
+            let (image, _) = pool.install(|| run(&Scattered, &choices, FILTERS[1], 7));
             image.pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
         });
         assert!(one == two, "{choices:?}");

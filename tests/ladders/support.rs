@@ -103,6 +103,7 @@ pub fn sampler<T: Target>(choices: Choices, columns: u32, evaluations: u64, seed
         size: [columns, 1],
         unit: 1.0,
         elsewhere: false,
+        outcomes: false,
         evaluations: Some(evaluations),
     })
 }
@@ -179,6 +180,7 @@ impl Stage {
                 mixes: std::array::from_fn(|_| mixes.clone()),
                 effort: [1.0, 1.0],
                 only_offers: true,
+                open: false,
                 half: u64::MAX,
                 ladder,
             },

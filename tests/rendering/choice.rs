@@ -36,12 +36,22 @@ fn a_hidden_lamp_wants_paths_from_the_lamp() {
     assert!(!chosen.contains(&MappingKind::Unidirectional), "{chosen:?}");
 }
 
-/// Light tracing alone would lack the balls; which of the two others comes first is a matter of a few bright paths.
+/// Light tracing alone would lack the balls; and what mirrors and glass do is found by few paths, which weigh least where all
+/// techniques are compared.
 #[test]
-fn caustics_want_light_tracing_beside_camera_paths() {
-    let chosen = choices("caustic", None);
-    let either = [MappingKind::TwoWay, MappingKind::Bidirectional];
-    assert!(chosen.iter().all(|kind| either.contains(kind)), "{chosen:?}");
+fn caustics_want_all_techniques() {
+    let scene = own("caustic", &[("res", "64")]);
+    for (method, kind) in [
+        (Method::Path, MappingKind::Bidirectional),
+        (Method::Mlt, MappingKind::Multiplexed),
+        (Method::ReplicaExchange, MappingKind::Multiplexed),
+    ] {
+        for seed in 0..3 {
+            let settings = Settings { method, seed, mutations_per_pixel: None, ..Settings::default() };
+            let trial = try_mappings(&scene, &settings);
+            assert!(trial.chosen == kind && trial.rare_paths, "{method:?}: {trial:?}");
+        }
+    }
 }
 
 /// Nothing but camera paths that happen to hit the lamp makes the light that the water is looked through for.
@@ -70,7 +80,7 @@ fn threads_do_not_change_a_bit_of_a_trial() {
 fn small_budgets_are_not_spent_on_trials() {
     let scene = own("lattice", &[("res", "16")]);
     let small = trial(&scene, 0, Some(1.0), 1);
-    assert_eq!(small, Trial { chosen: MappingKind::Unidirectional, errors: Vec::new() });
+    assert_eq!(small, Trial { chosen: MappingKind::Unidirectional, errors: Vec::new(), rare_paths: false });
     assert!(small.why().contains("no room for a trial"), "{}", small.why());
     let short = Settings { mutations_per_pixel: None, time: Some(Duration::from_millis(20)), ..Settings::default() };
     assert_eq!(try_mappings(&scene, &short), small);

@@ -14,6 +14,7 @@ mod darkness;
 mod furnace;
 mod mapping;
 mod mitsuba;
+mod outcomes;
 mod references;
 mod scattering;
 mod support;

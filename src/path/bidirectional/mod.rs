@@ -189,7 +189,9 @@ fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut 
         if HOW == OPEN {
             out.outcomes.clear(at);
         }
-        if HOW == ONE && let Some(block) = mapping.layout().light_choices() {
+        if HOW == ONE
+            && let Some(block) = mapping.layout().light_choices()
+        {
             w.chosen[at] = mapping.lengths().choose(proposals.block(block, at));
         }
     }
@@ -412,12 +414,7 @@ fn start_at_camera<const HOW: u8>(mapping: &Mapping, w: &mut Arrays) {
 }
 
 /// Adds the background to the paths that left the scene by their edge number `j`.
-fn collect_background<P: Profile, const HOW: u8>(
-    mapping: &Mapping,
-    j: u16,
-    w: &mut Arrays,
-    out: &mut Contributions,
-) {
+fn collect_background<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, w: &mut Arrays, out: &mut Contributions) {
     if P::FLAT_MESHES || mapping.scene().emitters.surrounding_light().is_none() {
         return;
     }
@@ -494,7 +491,11 @@ fn scatter_camera<P: Profile, const HOW: u8>(
                 }
             }
         }
-        if techniques.inner && w.kept[at] > 0 && (HOW != ONE || chosen.camera == j + 1) && site.scattering.is_smooth::<P>() {
+        if techniques.inner
+            && w.kept[at] > 0
+            && (HOW != ONE || chosen.camera == j + 1)
+            && site.scattering.is_smooth::<P>()
+        {
             // as many edges as both subpaths have, and the one between
             let longest = if HOW == ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
             for i in 1..=longest {

@@ -209,7 +209,7 @@ impl<W: Default + Send> Sampler<W> {
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
         let only_uniform = most_rungs == 1;
-        let open = outcomes && learns && std::env::var("RELT_CLOSED").is_err();
+        let open = outcomes && learns;
         let first = if open && choices.measure == Measure::Relative { OPEN_BOOTSTRAP } else { BOOTSTRAP };
         let length = if only_uniform { u64::MAX } else { at_most(first, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
         Sampler {

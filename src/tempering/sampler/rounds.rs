@@ -320,7 +320,8 @@ impl<W: Default + Send> Sampler<W> {
         };
         let [least, most] = [LEAST_UNIFORM, most].map(|share| self.share_of_evaluations(share));
         let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
-        self.measured(learnt).map(|measured| measured.choose(&shares))
+        let unmeasured = self.share_of_evaluations(0.5);
+        self.measured(learnt).map(|measured| measured.choose(&shares, unmeasured))
     }
 
     /// What the round has measured, if it has.

@@ -1,0 +1,125 @@
+//! Open points: all that a point of the multiplexed mapping may turn out to be, at once.
+
+use relt::embree::Width;
+use relt::path::{Contributions, Mapping, MappingKind, Outcome, Workspace};
+use relt::rng::{Counter, Purpose, Rng};
+use relt::sample::{Move, Points, Proposals};
+use relt::scene::Scene;
+
+use crate::support::{fixed_widths, load, own, repository};
+
+const LANES: usize = 64;
+
+/// Scenes whose paths have no more edges than [`LONGEST`].
+fn scenes() -> Vec<(&'static str, Scene)> {
+    let depth = [("res", "32"), ("max_depth", "6"), ("rr_depth", "3")];
+    let of_mitsuba = ["cylinder-light", "everything", "rough-metal", "sphere-light"];
+    let own = ["caustic", "lattice"].into_iter().map(|name| (name, own(name, &depth)));
+    let others = of_mitsuba
+        .into_iter()
+        .map(|name| (name, load(&repository("tests/mitsuba").join(name).with_extension("xml"), &[])));
+    own.chain(others).collect()
+}
+
+/// Edges of the longest paths that are compared.
+const LONGEST: usize = 6;
+
+/// Evaluates uniform points, whose choice is the given block where there is one.
+fn evaluate(mapping: &Mapping, choice: Option<[u32; 2]>, open: bool) -> Contributions {
+    let rng = Rng::new(9);
+    let counters: Vec<Counter> = (0..LANES)
+        .map(|lane| Counter { ladder: 3, replica: lane as u16, step: 0, purpose: Purpose::Primary })
+        .collect();
+    let (mut given, mut points) = (Points::new(LANES), Points::new(LANES));
+    if let Some([length, technique]) = choice {
+        let block = mapping.layout().light_choices().expect("points choose");
+        given.reserve(block);
+        for (lane, counter) in counters.iter().enumerate() {
+            let [light, _, _, last] = rng.words(*counter, block);
+            given.set(block, lane, [light, length, technique, last]);
+        }
+    }
+    let (mut out, mut workspace) = (Contributions::new(LANES), Workspace::default());
+    let mut proposals = Proposals {
+        rng,
+        current: &given,
+        given: &given,
+        points: &mut points,
+        counters: &counters,
+        moves: &[Move::Given; LANES],
+        film: [1, 1],
+    };
+    if open {
+        mapping.evaluate_open(&mut proposals, &mut out, &mut workspace);
+    } else {
+        mapping.evaluate(&mut proposals, &mut out, &mut workspace);
+    }
+    out
+}
+
+/// A word by which paths of so many edges are chosen.
+fn length_word(mapping: &Mapping, edges: usize) -> u32 {
+    (0..1 << 12)
+        .map(|i| i << 20)
+        .find(|word| {
+            let chosen = mapping.lengths().choose([0, *word, 0, 0]);
+            usize::from(chosen.light + chosen.camera) - 1 == edges
+        })
+        .expect("paths of that length are chosen")
+}
+
+/// What a point contributes that chooses technique after technique is what its outcomes say, over their chances; and
+/// points that choose contribute nothing that is no outcome, but where roulette ends open ones.
+#[test]
+fn outcomes_are_what_points_contribute_that_choose_them() {
+    for (name, scene) in scenes() {
+        let mapping = Mapping::new(&scene, MappingKind::Multiplexed, fixed_widths(Width::W8));
+        let outcomes = evaluate(&mapping, None, true).outcomes;
+        let longest = usize::from(mapping.layout().max_depth()).min(LONGEST);
+        let mut open: Vec<Vec<Outcome>> = (0..LANES).map(|lane| outcomes.of(lane).to_vec()).collect();
+        let all = open.iter().flatten().filter(|outcome| outcome.splat.luminance() > 0.0).count();
+        let (mut found, mut lost) = (0, 0);
+        for edges in 1..=longest {
+            let length = length_word(&mapping, edges);
+            for light in 0..=if edges == 1 { 0 } else { edges } {
+                let technique = mapping.lengths().technique_word(edges, light, 1 << 31);
+                let chosen = evaluate(&mapping, Some([length, technique]), false);
+                for (lane, open) in open.iter_mut().enumerate() {
+                    let whole = chosen.whole(lane);
+                    let Some(part) = whole.parts().find(|part| part.luminance() > 0.0) else { continue };
+                    let same = |outcome: &Outcome| {
+                        let value = outcome.splat.luminance() / f64::from(outcome.chance);
+                        outcome.splat.film == part.film
+                            && (value / part.luminance() - 1.0).abs() < 1e-3
+                            && (outcome.ln_g - whole.main.ln_g).abs() < 1e-3
+                    };
+                    match open.iter().position(same) {
+                        Some(i) => {
+                            let outcome = open.swap_remove(i);
+                            assert_eq!(outcome.own, light != edges || edges == 1, "{name}: {edges} edges, {light}");
+                            found += 1;
+                        }
+                        None => lost += 1,
+                    }
+                }
+            }
+        }
+        let left = open.iter().flatten().filter(|outcome| outcome.splat.luminance() > 0.0).count();
+        assert!(found > LANES / 4, "{name}: {found} outcomes found");
+        assert_eq!(found + left, all, "{name}");
+        if usize::from(mapping.layout().max_depth()) <= LONGEST {
+            assert_eq!(left, 0, "{name}: outcomes that no choice leads to, of {all}");
+        }
+        let plays = mapping.layout().roulette_from().is_some_and(|bounce| usize::from(bounce) + 2 <= longest);
+        assert!(lost == 0 || plays && lost < found / 2, "{name}: {lost} choices are no outcomes, {found} are");
+    }
+}
+
+#[test]
+fn other_mappings_have_one_outcome() {
+    let scene = own("caustic", &[("res", "16")]);
+    for kind in MappingKind::ALL {
+        let mapping = Mapping::new(&scene, kind, fixed_widths(Width::W8));
+        assert_eq!(mapping.has_outcomes(), kind == MappingKind::Multiplexed, "{kind:?}");
+    }
+}
