@@ -87,6 +87,21 @@ impl Measured {
         probes.iter().zip(&importances).map(|([a, b], importance)| importance.sqrt() * (a - b).abs()).sum()
     }
 
+    /// Variance of what a uniform point adds to its pixel as path tracing has it, in the measure of the error, where pixels
+    /// have enough points to tell.
+    pub fn noise_of_points(&self) -> Option<f64> {
+        let (mut sum, mut seen) = (0.0, 0.0);
+        for ((halves, squares), importance) in self.probes[0].iter().zip(&self.squares[0]).zip(self.importances()) {
+            let points = halves[0][2] + halves[1][2];
+            if points >= 2.0 {
+                let mean = (halves[0][0] + halves[1][0]) / points;
+                sum += importance * (squares[0] - points * mean * mean).max(0.0) / (points - 1.0);
+                seen += 1.0;
+            }
+        }
+        (seen > 0.0).then(|| sum / seen)
+    }
+
     /// How many states of chains are worth one independent one, for the image: the variance of what they add by that of
     /// as many independent ones, Σ (A − B)²/Σ w x² over probes, with x what a state of expected weight w adds.
     pub fn correlation(&self) -> Option<f64> {

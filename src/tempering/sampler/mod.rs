@@ -62,6 +62,8 @@ pub struct Sampler<W> {
     ladders_a_block: usize,
     /// Weights and shares of the round.
     choice: Choice,
+    /// Whether uniform points leave chains anything to gain, as far as is known before there are any.
+    promising: bool,
     /// Centre of the sizes of steps on the target, in scales of the bank.
     centre: f64,
     /// Rungs were moved for the next round.
@@ -233,6 +235,7 @@ impl<W: Default + Send> Sampler<W> {
             offers: 0,
             ladders_a_block: 0,
             choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            promising: true,
             centre: steps::KELEMEN,
             moved: false,
             ladder_rays: 0,

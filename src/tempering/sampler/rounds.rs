@@ -53,6 +53,14 @@ const FIRST_RATIO: f64 = 0.25;
 /// Share of uniform points, at least, and at most where chains are asked for.
 const LEAST_UNIFORM: f64 = 0.1;
 const MOST_UNIFORM_WITH_CHAINS: f64 = 15.0 / 16.0;
+/// States of chains have at least the noise of a number of samples that chance decides: a relative variance of 1 a state in
+/// the pixel. Where that of a uniform point is not more than this, chains are to be given up, unless they find what those
+/// points do not know of: they get a small part of the work from the start. (By camera paths `cornell-box` has some 0.14,
+/// `lattice` 50: relMSE times mutations per pixel of `--method path`.)
+const LEAST_NOISE: f64 = 1.0;
+/// Error, by that of path tracing, by which chains that had not promised anything get a say after all. (On `cornell-box` a
+/// first round told 0.62 where there was nothing to gain.)
+const SURPRISE: f64 = 0.25;
 
 impl<W: Default + Send> Sampler<W> {
     /// Ends the round at work and begins the next.
@@ -201,7 +209,11 @@ impl<W: Default + Send> Sampler<W> {
         self.screen.layers = self.screen.prepared;
         self.bootstrap = self.points[0];
         self.rays_a_point = self.uniform_rays.map(|[points, rays]| rays as f64 / (points as f64).max(1.0));
-        let share = self.choices.uniform_share.unwrap_or_else(|| self.share_of_evaluations(0.5));
+        let noise = self.measured(learnt).and_then(|measured| measured.noise_of_points());
+        self.promising =
+            self.choices.ladder != LadderChoice::Auto || noise.is_none_or(|noise| noise > LEAST_NOISE);
+        let share = if self.promising { 0.5 } else { MOST_UNIFORM_WITH_CHAINS };
+        let share = self.choices.uniform_share.unwrap_or_else(|| self.share_of_evaluations(share));
         self.choice = Choice { ratio: FIRST_RATIO, share, relative_error: f64::NAN };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
@@ -316,12 +328,17 @@ impl<W: Default + Send> Sampler<W> {
             // chains that promise nothing after some rounds are not listened to any longer
             (true, last) if last || self.schedule.round >= ROUNDS_OF_GRACE => 1.0,
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
+            _ if !self.promising => MOST_UNIFORM_WITH_CHAINS,
             _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
         };
         let [least, most] = [LEAST_UNIFORM, most].map(|share| self.share_of_evaluations(share));
         let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
         let unmeasured = self.share_of_evaluations(0.5);
-        self.measured(learnt).map(|measured| measured.choose(&shares, unmeasured))
+        let measured = self.measured(learnt)?;
+        let choice = measured.choose(&shares, unmeasured);
+        let surprise = choice.relative_error < SURPRISE;
+        let only_watch = !self.promising && !surprise && self.choices.uniform_share.is_none() && most < 1.0;
+        Some(if only_watch { measured.choose(&(*shares.end()..=*shares.end()), unmeasured) } else { choice })
     }
 
     /// What the round has measured, if it has.
@@ -336,7 +353,10 @@ impl<W: Default + Send> Sampler<W> {
             squares: (0..RATIOS.len()).map(|ratio| probes.squares(ratio)).collect(),
             pixels,
             states: chains * states,
-            tempered_scale: pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states),
+            tempered_scale: match states {
+                0.0 => 0.0,
+                states => pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states),
+            },
             normaliser_variance: target.relative_error.powi(2),
             measure: self.choices.measure,
             mean: learnt.luminance.value,
