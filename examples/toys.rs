@@ -156,6 +156,7 @@ fn sample(toy: &Toy, ladder: LadderChoice, combine: Combine, evaluations: u64, s
         size: [COLUMNS, 1],
         unit: toy.c(),
         elsewhere: false,
+        outcomes: false,
         evaluations: Some(evaluations),
     });
     while sampler.sweeps_left() != Some(0) {
