@@ -4,7 +4,7 @@
 
 use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
-    path::Whole,
+    path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -161,8 +161,8 @@ impl<W: Default> Baseline<W> {
     }
 
     /// Rays traced and contributions settled so far.
-    pub fn rays_and_faults(&self) -> (u64, u64) {
-        (self.evaluator.out.rays, self.evaluator.out.non_finite)
+    pub fn rays_and_faults(&self) -> (u64, &Faults) {
+        (self.evaluator.out.rays, &self.evaluator.out.faults)
     }
 }
 

@@ -99,6 +99,8 @@ impl<W: Default> Evaluator<W> {
         let rays = &mut self.out.rays;
         self.given.clear(lane);
         let change = target.change_technique((current, lane), beta, &mut random, &mut self.given, rays);
+        // nothing is known of the odds of a change that is not finite: it must not reach an acceptance probability
+        let change = change.filter(|expected| expected.is_finite());
         self.moves[lane] = if change.is_some() { Move::Given } else { Move::Rest };
         self.expected[lane] = change.unwrap_or(0.0);
         change.is_some()

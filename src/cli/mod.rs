@@ -8,6 +8,8 @@ mod ladder;
 mod loading;
 mod reference;
 mod render;
+mod replay;
+mod run_options;
 mod scene;
 mod signals;
 mod study;
@@ -30,6 +32,7 @@ struct Arguments {
 enum Command {
     Render(Box<render::Render>),
     Info(info::Info),
+    Replay(Box<replay::Replay>),
     Ladder(ladder::Ladder),
     Study(study::StudyArguments),
     Compare(compare::Compare),
@@ -61,6 +64,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.command {
         Command::Render(arguments) => render::run(*arguments),
         Command::Info(arguments) => info::run(arguments),
+        Command::Replay(arguments) => replay::run(*arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
         Command::Study(arguments) => study::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),

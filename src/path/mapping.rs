@@ -1,15 +1,20 @@
 //! The mappings and the choice among them.
 
+use std::sync::OnceLock;
+
 use serde::Serialize;
 
 use super::{
-    Contributions, Layout, RecordedRays, Widths, bidirectional,
+    Causes, Contribution, Contributions, Elsewhere, Evaluation, Event, Layout, Narration, RecordedRays, Widths,
+    bidirectional,
     bidirectional::{Lengths, Techniques},
+    scalar,
     tracing::Tracing,
     unidirectional,
 };
 use crate::{
-    sample::{Block, Points, Proposals},
+    rng::{Counter, Rng},
+    sample::{Block, Move, Points, Proposals},
     scene::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile, Scene},
 };
 
@@ -81,6 +86,7 @@ impl MappingKind {
 }
 
 type Evaluate = fn(&Mapping, &mut Proposals, &mut Contributions, &mut Workspace);
+type Walk = fn(&Mapping, &mut Proposals, usize, &mut Narration) -> (Contribution, Elsewhere, Causes);
 
 /// The mapping of one scene.
 pub struct Mapping<'s> {
@@ -92,6 +98,27 @@ pub struct Mapping<'s> {
     lengths: Lengths,
     technique_changes: bool,
     evaluate: Evaluate,
+    walk: Walk,
+    /// An evaluation to look out for, where somebody asked for one.
+    watch: Option<Watch>,
+}
+
+/// Looks out for the evaluation that draws the words of a counter.
+struct Watch {
+    counter: Counter,
+    seen: OnceLock<Evaluation>,
+}
+
+impl Watch {
+    /// Keeps the evaluation, if it is among these.
+    #[cold]
+    fn look(&self, proposals: &Proposals) {
+        let lane = (0..proposals.lanes())
+            .find(|lane| proposals.counters[*lane] == self.counter && proposals.moves[*lane] != Move::Rest);
+        if let Some(evaluation) = lane.and_then(|lane| Evaluation::of(proposals, lane)) {
+            self.seen.get_or_init(|| evaluation);
+        }
+    }
 }
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
@@ -129,10 +156,10 @@ impl<'s> Mapping<'s> {
     /// The mapping by a given kernel, which must do all that the scene needs.
     pub fn with_kernel(scene: &'s Scene, kind: MappingKind, widths: Widths, kernel: Kernel) -> Mapping<'s> {
         assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
-        let evaluate = match kernel {
-            Kernel::Diffuse => evaluate::<DiffuseProfile>(kind),
-            Kernel::Plain => evaluate::<PlainProfile>(kind),
-            Kernel::Full => evaluate::<FullProfile>(kind),
+        let (evaluate, walk) = match kernel {
+            Kernel::Diffuse => (evaluate::<DiffuseProfile>(kind), walk::<DiffuseProfile>(kind)),
+            Kernel::Plain => (evaluate::<PlainProfile>(kind), walk::<PlainProfile>(kind)),
+            Kernel::Full => (evaluate::<FullProfile>(kind), walk::<FullProfile>(kind)),
         };
         let layout = Layout::new(&scene.features, kind == MappingKind::Multiplexed);
         Mapping {
@@ -143,6 +170,8 @@ impl<'s> Mapping<'s> {
             widths,
             technique_changes: false,
             evaluate,
+            walk,
+            watch: None,
         }
     }
 
@@ -200,7 +229,64 @@ impl<'s> Mapping<'s> {
     /// Evaluates the proposals of all lanes that do not rest.
     pub fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
         (self.evaluate)(self, proposals, out, workspace);
+        if let Some(watch) = &self.watch {
+            watch.look(proposals);
+        }
     }
+
+    /// Looks out for the evaluation that draws the words of that counter.
+    pub fn watching(mut self, counter: Counter) -> Self {
+        self.watch = Some(Watch { counter, seen: OnceLock::new() });
+        self
+    }
+
+    /// The evaluation that was looked out for, once it has been.
+    pub fn watched(&self) -> Option<&Evaluation> {
+        self.watch.as_ref().and_then(|watch| watch.seen.get())
+    }
+
+    /// Evaluates the proposal of one lane and tells how, the same to the bit as in a batch.
+    pub fn walk(
+        &self,
+        proposals: &mut Proposals,
+        lane: usize,
+        narration: &mut Narration,
+    ) -> (Contribution, Elsewhere, Causes) {
+        (self.walk)(self, proposals, lane, narration)
+    }
+
+    /// Goes through an evaluation once more: what it contributes, there and elsewhere, why that had to be settled, and all
+    /// that happens on the way.
+    pub fn retrace(&self, evaluation: &Evaluation) -> Retraced {
+        let given = evaluation.point.to_points();
+        let (counters, moves) = ([evaluation.counter], [Move::Given]);
+        let mut points = Points::new(1);
+        let mut proposals = Proposals {
+            rng: Rng::new(0), // all blocks are given
+            current: &given,
+            given: &given,
+            points: &mut points,
+            counters: &counters,
+            moves: &moves,
+            film: [1, 1],
+        };
+        proposals.begin(&mut Vec::new());
+        let mut narration = Narration::kept();
+        let (contribution, elsewhere, causes) = self.walk(&mut proposals, 0, &mut narration);
+        Retraced { contribution, elsewhere, causes, events: narration.events() }
+    }
+}
+
+/// An evaluation, told.
+pub struct Retraced {
+    /// What the point contributes.
+    pub contribution: Contribution,
+    /// What it gives to the film elsewhere; of one lane.
+    pub elsewhere: Elsewhere,
+    /// Why how many of its values had to be settled.
+    pub causes: Causes,
+    /// What happens on the way, in order.
+    pub events: Vec<Event>,
 }
 
 fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
@@ -208,5 +294,15 @@ fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
         MappingKind::Unidirectional => unidirectional::evaluate::<P>,
         MappingKind::Multiplexed => bidirectional::multiplexed::<P>,
         _ => bidirectional::evaluate::<P>,
+    }
+}
+
+fn walk<P: Profile>(kind: MappingKind) -> Walk {
+    match kind {
+        MappingKind::Unidirectional => |mapping, proposals, lane, narration| {
+            let (contribution, causes) = scalar::walk::<P>(mapping.scene, &mapping.layout, proposals, lane, narration);
+            (contribution, Elsewhere::new(1), causes)
+        },
+        _ => bidirectional::scalar::walk::<P>,
     }
 }

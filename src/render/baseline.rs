@@ -11,7 +11,7 @@ use super::{
 use crate::{
     chain::{Baseline, Evaluator, LargeSteps, Plan, Start, baseline_layer, resample},
     film::{Accumulator, Plane, Splats},
-    path::Workspace,
+    path::{Faults, Workspace},
     rng::{Counter, Purpose},
     sample::{Move, Points},
     tempering::Estimate,
@@ -35,7 +35,7 @@ pub struct Mlt {
     bootstrap: Vec<(f64, f64)>,
     bootstrap_samples: u64,
     bootstrap_rays: u64,
-    bootstrap_faults: u64,
+    bootstrap_faults: Faults,
     /// c from the first pass alone, also the magnitude that states are kept in on the film.
     first_estimate: Estimate,
 }
@@ -55,6 +55,8 @@ impl Mlt {
         let bootstrap: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
+        let mut bootstrap_faults = Faults::default();
+        batches.iter().for_each(|batch| bootstrap_faults.merge(&batch.faults));
         // a black scene has no state to start from: no chains, a black image
         let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
         let blocks = starts
@@ -73,7 +75,7 @@ impl Mlt {
             pools: settings.normalisation == Normalisation::Pooled,
             bootstrap_samples,
             bootstrap_rays: batches.iter().map(|b| b.rays).sum(),
-            bootstrap_faults: batches.iter().map(|b| b.faults).sum(),
+            bootstrap_faults,
             first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
         }
@@ -106,7 +108,7 @@ impl Mlt {
 struct Batch {
     ln_g: Vec<f64>,
     rays: u64,
-    faults: u64,
+    faults: Faults,
 }
 
 fn bootstrap_counter(sample: u64) -> Counter {
@@ -128,7 +130,7 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
             evaluator.moves.fill(Move::Fresh);
             evaluator.evaluate(&stage.mapping, &Points::new(0));
             let out = evaluator.out;
-            Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.non_finite }
+            Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.faults }
         })
         .collect()
 }
@@ -167,7 +169,7 @@ impl Engine for Mlt {
         let mut counts = Counts {
             mutations: self.bootstrap_samples,
             rays: self.bootstrap_rays,
-            non_finite: self.bootstrap_faults,
+            faults: self.bootstrap_faults.clone(),
             ..Counts::default()
         };
         let mut accepted = (0.0, 0);
@@ -175,7 +177,7 @@ impl Engine for Mlt {
             let (rays, faults) = block.chains.rays_and_faults();
             counts.mutations += block.chains.mutations();
             counts.rays += rays;
-            counts.non_finite += faults;
+            counts.faults.merge(faults);
             counts.technique_changes.merge(&block.chains.changed);
             for (sum, n) in [block.chains.small, block.chains.large] {
                 accepted = (accepted.0 + sum, accepted.1 + n);

@@ -3,7 +3,7 @@
 use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
-    path::Mapping,
+    path::{Faults, Mapping},
     rng::Rng,
     tempering::{Estimate, RoundReport},
 };
@@ -73,7 +73,7 @@ pub struct Counts {
     /// Rays traced.
     pub rays: u64,
     /// Contributions settled.
-    pub non_finite: u64,
+    pub faults: Faults,
     /// Mean acceptance probability by tempered rung, coldest last.
     pub acceptance: Vec<f64>,
     /// Mean swap probability by pair of rungs, hottest first.

@@ -5,6 +5,7 @@
 //! written. Times are seconds, rates are probabilities. A line is on its way to
 //! the disk once its event is over, so the log of a run that was killed is complete up to then.
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
@@ -178,6 +179,9 @@ struct Now<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     technique_changes: Option<TechniqueChanges>,
     non_finite: u64,
+    /// Numbers of them by cause; absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    faults: Option<BTreeMap<&'static str, u64>>,
     normalisation: Option<f64>,
     normalisation_error: Option<f64>,
 }
@@ -194,6 +198,7 @@ impl<'a> From<&'a Status> for Now<'a> {
             swap: &status.swap,
             technique_changes: Some(status.technique_changes).filter(|changes| *changes != TechniqueChanges::default()),
             non_finite: status.non_finite,
+            faults: Some(status.faults.by_cause()).filter(|causes| !causes.is_empty()),
             normalisation: status.normalisation.map(|(value, _)| value),
             normalisation_error: status.normalisation.map(|(_, error)| error),
         }

@@ -7,6 +7,7 @@ pub mod engine;
 pub mod log;
 pub mod output;
 pub mod progress;
+pub mod replay;
 mod replica_exchange;
 mod run;
 pub mod settings;

@@ -63,7 +63,7 @@ impl Engine for ReplicaExchange {
         Counts {
             mutations: self.sampler.evaluations(),
             rays: self.sampler.rays(),
-            non_finite: self.sampler.non_finite(),
+            faults: self.sampler.faults().clone(),
             acceptance,
             swap,
             technique_changes: self.sampler.technique_changes(),

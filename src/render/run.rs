@@ -15,13 +15,13 @@ use super::{
     engine::{Engine, Phase, Stage},
     output::{Picture, metadata},
     replica_exchange::ReplicaExchange,
-    settings::{MappingChoice, Method, PacketChoice, Settings},
+    settings::{Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
     trial,
 };
 use crate::{
     film::Footprint,
-    path::{Mapping, Widths},
+    path::{Fault, Mapping, MappingKind, Widths, first_fault},
     rng::Rng,
     scene::Scene,
     tempering::RoundReport,
@@ -45,6 +45,8 @@ pub struct Outcome {
     pub picture: Picture,
     /// Where the run stood at its end.
     pub status: Status,
+    /// The mapping, in fact.
+    pub mapping: MappingKind,
     /// It was stopped before its budget was spent.
     pub interrupted: bool,
     /// What the person should know, one sentence each.
@@ -75,13 +77,7 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
-    let (mapping, mapping_trial) = match job.settings.mapping {
-        MappingChoice::Auto => {
-            let trial = pool.install(|| trial::try_mappings(job.scene, &job.settings));
-            (trial.chosen, Some(trial.why()))
-        }
-        MappingChoice::Fixed(mapping) => (mapping, None),
-    };
+    let (mapping, mapping_trial) = pool.install(|| trial::settle(job.scene, &job.settings));
     let widths = match job.settings.packet {
         PacketChoice::Auto => calibration::calibrate(job.scene, mapping),
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
@@ -114,7 +110,8 @@ struct Watch {
     last_round: Option<Arc<RoundReport>>,
 }
 
-fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
+/// Threads to work on.
+pub(super) fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
     let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("relt {i}"));
     if pin && let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
         builder = builder.start_handler(move |i| {
@@ -206,7 +203,8 @@ fn status(job: &Job, engine: &dyn Engine, watch: &Watch) -> Status {
         acceptance: counts.acceptance,
         swap: counts.swap,
         technique_changes: counts.technique_changes,
-        non_finite: counts.non_finite,
+        non_finite: counts.faults.total(),
+        faults: counts.faults,
         normalisation: None,
         last_round: watch.last_round.clone(),
     }
@@ -234,15 +232,25 @@ fn conclude(
         let (name, missed) = (start.mapping.name(), missed.join(" and "));
         warnings.push(format!("the image lacks {missed}: --mapping {name} makes no paths to that, all others do"));
     }
-    if status.non_finite > 0 {
-        warnings.push(format!(
-            "{} of {} paths had a contribution that was not finite; they count as dark",
-            status.non_finite, status.mutations
-        ));
-    }
+    warnings.extend(non_finite(stage, &status));
     let metadata = metadata(start, &status);
     let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
-    Outcome { picture, status, interrupted, warnings }
+    Outcome { picture, status, mapping: start.mapping, interrupted, warnings }
+}
+
+/// What to say of contributions that were settled: how many, why, and where the first of them went wrong.
+fn non_finite(stage: &Stage, status: &Status) -> Option<String> {
+    let place = |fault: &Fault| first_fault(&stage.mapping.retrace(&fault.evaluation).events);
+    let place = status.faults.first().and_then(place);
+    let place = place.map_or(String::new(), |place| format!("; the first is so from here on: {place}"));
+    (status.non_finite > 0).then(|| {
+        format!(
+            "{} of {} paths had a contribution that was not finite or negative ({}); it counts as dark{place}",
+            status.non_finite,
+            status.mutations,
+            status.faults.in_words()
+        )
+    })
 }
 
 fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
@@ -275,7 +283,6 @@ mod tests {
     use crate::{
         embree::{Device, Width},
         film::Image,
-        path::MappingKind,
         render::engine::{Counts, Development},
     };
 

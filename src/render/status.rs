@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::output::Picture;
 use super::settings::Settings;
 use crate::chain::TechniqueChanges;
-use crate::path::MappingKind;
+use crate::path::{Faults, MappingKind};
 use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
@@ -75,8 +75,10 @@ pub struct Status {
     pub swap: Vec<f64>,
     /// What became of changes of technique; of the round, on a ladder.
     pub technique_changes: TechniqueChanges,
-    /// Contributions that were not finite and were taken as zero.
+    /// Contributions that could not be used and were taken as zero.
     pub non_finite: u64,
+    /// Why, and which was the first.
+    pub faults: Faults,
     /// The estimate of c = ∫ g and its standard error, once there is one.
     pub normalisation: Option<(f64, f64)>,
     /// The last round that ended; absent before that, and for methods without rounds.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::settings::Settings;
+use super::settings::{MappingChoice, Settings};
 use crate::{
     chain::Evaluator,
     embree::Width,
@@ -50,6 +50,17 @@ pub fn candidates(features: &Features) -> Vec<MappingKind> {
     // multiplexed has one technique a point: never less noise than all, and seldom less error
     let serves = |kind: &MappingKind| *kind != MappingKind::Multiplexed && kind.misses(features).is_empty();
     MappingKind::ALL.into_iter().filter(serves).collect()
+}
+
+/// The mapping that settings ask for, and where that is left to a trial, why it is that one.
+pub fn settle(scene: &Scene, settings: &Settings) -> (MappingKind, Option<String>) {
+    match settings.mapping {
+        MappingChoice::Auto => {
+            let trial = try_mappings(scene, settings);
+            (trial.chosen, Some(trial.why()))
+        }
+        MappingChoice::Fixed(mapping) => (mapping, None),
+    }
 }
 
 /// Tries all mappings that could serve the scene on some thousand uniform points each, as far as the budget has room for

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     chain::{Evaluator, Importance, Start, Target, Walkers, replay},
-    path::Whole,
+    path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -356,13 +356,13 @@ impl<W: Default + Send> Block<W> {
     }
 
     /// Rays traced and contributions settled since this was last asked for.
-    pub fn take_rays_and_faults(&mut self) -> [u64; 2] {
-        let mut sums = [0; 2];
+    pub fn take_rays_and_faults(&mut self) -> (u64, Faults) {
+        let (mut rays, mut faults) = (0, Faults::default());
         for part in &mut self.parts {
-            sums[0] += std::mem::take(&mut part.evaluator.out.rays);
-            sums[1] += std::mem::take(&mut part.evaluator.out.non_finite);
+            rays += std::mem::take(&mut part.evaluator.out.rays);
+            faults.merge(&std::mem::take(&mut part.evaluator.out.faults));
         }
-        sums
+        (rays, faults)
     }
 }
 

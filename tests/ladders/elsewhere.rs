@@ -74,9 +74,9 @@ impl Target for Scattered {
             }
             let red = if t < 0.5 { Scattered::own(x, y) / 0.5 } else { 0.0 };
             let rgb = Rgb::new(red, 0.0, 0.0);
-            let (whole, faults) = Contribution::settle_whole([x, y], rgb, &mut out.elsewhere, lane);
+            let (whole, causes) = Contribution::settle_whole([x, y], rgb, &mut out.elsewhere, lane);
             out.lanes[lane] = whole;
-            out.non_finite += faults;
+            out.faults.count(causes);
         }
     }
 

@@ -2,7 +2,9 @@
 
 use relt::chain::Evaluator;
 use relt::embree::Width;
-use relt::path::{Contribution, Elsewhere, Mapping, MappingKind, Workspace, bidirectional, scalar};
+use relt::path::{
+    Cause, Causes, Contribution, Elsewhere, Faults, Mapping, MappingKind, Workspace, bidirectional, scalar,
+};
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
 use relt::scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
@@ -43,10 +45,14 @@ fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
 }
 
 /// What the specification says of a lane.
-fn specified<P: Profile>(mapping: &Mapping, proposals: &mut Proposals, lane: usize) -> (Contribution, Elsewhere, u64) {
+fn specified<P: Profile>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    lane: usize,
+) -> (Contribution, Elsewhere, Causes) {
     if mapping.kind() == MappingKind::Unidirectional {
-        let (contribution, fault) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
-        return (contribution, Elsewhere::new(1), u64::from(fault));
+        let (contribution, causes) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
+        return (contribution, Elsewhere::new(1), causes);
     }
     bidirectional::scalar::evaluate::<P>(mapping, proposals, lane)
 }
@@ -64,7 +70,7 @@ fn compare<P: Profile>(
     let mut evaluator = Evaluator::<Workspace>::new(rng, counters(0));
     let mut current = Points::new(LANES);
     let mut all = Vec::new();
-    let mut faults = 0;
+    let mut faults = Faults::default();
     for step in 0..STEPS {
         let moves = moves(step);
         evaluator.counters = counters(step);
@@ -93,12 +99,12 @@ fn compare<P: Profile>(
         for lane in live.into_iter().map(|lane| lane as usize) {
             let replay =
                 format!("{name}, {} mapping, {kernel:?} kernel, width {width}, step {step}, lane {lane}", kind.name());
-            let (expected, elsewhere, fault) = specified::<P>(&mapping, &mut proposals, lane);
+            let (expected, elsewhere, causes) = specified::<P>(&mapping, &mut proposals, lane);
             let got = evaluator.out.lanes[lane];
             assert_eq!(bits(&got), bits(&expected), "{replay}: {got:?} for {expected:?}");
             let got_elsewhere = evaluator.out.elsewhere.of(lane);
             assert_eq!(got_elsewhere, elsewhere.of(0), "{replay}: elsewhere");
-            faults += fault;
+            faults.count(causes);
             let used = proposals.points.used(lane);
             assert_eq!(evaluator.points.used(lane), used, "{replay}: blocks");
             for block in (0..used[0]).chain(LIGHT_STREAM..LIGHT_STREAM + used[1]) {
@@ -113,7 +119,8 @@ fn compare<P: Profile>(
             current.copy(lane, &points, lane);
         }
     }
-    assert_eq!(evaluator.out.non_finite, faults, "{name}: faults");
+    let by_cause = |faults: &Faults| Cause::ALL.map(|cause| faults.of(cause));
+    assert_eq!(by_cause(&evaluator.out.faults), by_cause(&faults), "{name}: faults");
     all
 }
 

@@ -465,10 +465,12 @@ fn scatter_camera<P: Profile, const ONE: bool>(mapping: &Mapping, j: u16, propos
 fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
-            let (contribution, faults) =
+            let (contribution, causes) =
                 Contribution::settle_whole(w.film[lane], w.radiance[lane], &mut out.elsewhere, lane);
             out.lanes[lane] = contribution;
-            out.non_finite += faults;
+            if !causes.is_none() {
+                out.faults.note(causes, proposals, lane);
+            }
         }
     }
 }

@@ -30,6 +30,7 @@ use super::{
 use crate::{
     chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target, TechniqueChanges},
     film::{Accumulator, Footprint},
+    path::Faults,
     rng::Rng,
 };
 
@@ -81,7 +82,7 @@ pub struct Sampler<W> {
     sweeps: u64,
     evaluations: u64,
     wanted: Option<u64>,
-    non_finite: u64,
+    faults: Faults,
     rays: u64,
     reports: Vec<RoundReport>,
 }
@@ -237,7 +238,7 @@ impl<W: Default + Send> Sampler<W> {
             evaluations: 0,
             wanted: evaluations,
             rays: 0,
-            non_finite: 0,
+            faults: Faults::default(),
         }
     }
 
@@ -323,10 +324,10 @@ impl<W: Default + Send> Sampler<W> {
             }
         });
         for portion in &mut self.portions {
-            let [uniform, faults] = portion.uniform.take_rays_and_faults();
-            let [ladders, more] = portion.ladders.as_mut().map_or([0; 2], Block::take_rays_and_faults);
+            let (uniform, faults) = portion.uniform.take_rays_and_faults();
+            let (ladders, more) = portion.ladders.as_mut().map(Block::take_rays_and_faults).unwrap_or_default();
             self.rays += uniform + ladders;
-            self.non_finite += faults + more;
+            [faults, more].iter().for_each(|faults| self.faults.merge(faults));
             self.ladder_rays += ladders;
         }
         self.points[0] += sweeps * (self.portions.len() * self.schedule.points) as u64;
@@ -356,9 +357,9 @@ impl<W: Default + Send> Sampler<W> {
         self.rays
     }
 
-    /// Contributions so far that were not finite and were taken as zero.
-    pub fn non_finite(&self) -> u64 {
-        self.non_finite
+    /// Contributions so far that could not be used and were taken as zero.
+    pub fn faults(&self) -> &Faults {
+        &self.faults
     }
 
     /// The film.

@@ -57,7 +57,7 @@ impl<W: Default + Send> Sampler<W> {
             offers: if chains { self.offers as u64 } else { 0 },
             chain_ratio: self.round.weights.ratio(),
             split_r_hat: self.split_r_hat(),
-            non_finite: self.non_finite,
+            non_finite: self.faults.total(),
             rays: self.rays,
             rungs: if chains { self.rung_reports(learnt, &counts) } else { Vec::new() },
             index_process: index.map_or_else(Vec::new, |index| index.rungs.clone()),
