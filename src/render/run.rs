@@ -242,10 +242,10 @@ fn conclude(
 fn non_finite(stage: &Stage, status: &Status) -> Option<String> {
     let place = |fault: &Fault| first_fault(&stage.mapping.retrace(&fault.evaluation).events);
     let place = status.faults.first().and_then(place);
-    let place = place.map_or(String::new(), |place| format!("; the first is so from here on: {place}"));
+    let place = place.map_or(String::new(), |place| format!("; the first went wrong here: {place}"));
     (status.non_finite > 0).then(|| {
         format!(
-            "{} of {} paths had a contribution that was not finite or negative ({}); it counts as dark{place}",
+            "{} contributions of {} paths were not finite or negative ({}) and count as dark{place}",
             status.non_finite,
             status.mutations,
             status.faults.in_words()

@@ -3,7 +3,8 @@
 use relt::chain::Evaluator;
 use relt::embree::Width;
 use relt::path::{
-    Cause, Causes, Contribution, Elsewhere, Faults, Mapping, MappingKind, Workspace, bidirectional, scalar,
+    Cause, Causes, Contribution, Elsewhere, Evaluation, Event, Faults, Mapping, MappingKind, Retraced, Workspace,
+    bidirectional, scalar,
 };
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
@@ -42,6 +43,21 @@ fn counters(step: u64) -> Vec<Counter> {
 
 fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
     (c.film.map(f32::to_bits), c.rgb.to_array().map(f32::to_bits), c.ln_g.to_bits())
+}
+
+/// The sum that a retraced path ends its camera's subpath with; black where it found nothing.
+fn told_sum(events: &[Event]) -> [f64; 3] {
+    let own = |event: &&Event| event.quantities.iter().all(|q| q.name != "film");
+    let sums = events.iter().filter(own).flat_map(|event| &event.quantities).filter(|q| q.name == "sum so far");
+    sums.last().map_or([0.0; 3], |sum| sum.values[..].try_into().expect("three channels"))
+}
+
+/// What that should be.
+fn told_sum_of(got: &Contribution, retraced: &Retraced) -> [f64; 3] {
+    match retraced.causes.is_none() {
+        true => got.rgb.to_array().map(f64::from),
+        false => told_sum(&retraced.events), // replaced by black
+    }
 }
 
 /// What the specification says of a lane.
@@ -109,6 +125,13 @@ fn compare<P: Profile>(
             assert_eq!(evaluator.points.used(lane), used, "{replay}: blocks");
             for block in (0..used[0]).chain(LIGHT_STREAM..LIGHT_STREAM + used[1]) {
                 assert_eq!(evaluator.points.block(block, lane), proposals.block(block, lane), "{replay}: {block}");
+            }
+            if step % 8 == 0 {
+                let evaluation = Evaluation::of(&proposals, lane).expect("the lane does not rest");
+                let retraced = mapping.retrace(&evaluation);
+                assert_eq!(bits(&retraced.contribution), bits(&got), "{replay}: retraced");
+                assert_eq!(retraced.elsewhere.of(0), got_elsewhere, "{replay}: retraced elsewhere");
+                assert_eq!(told_sum(&retraced.events), told_sum_of(&got, &retraced), "{replay}: {:?}", retraced.events);
             }
             all.push(got);
             if !got.is_dark() {

@@ -372,7 +372,8 @@ impl<W: Default + Send> Sampler<W> {
         &self.round.ladder
     }
 
-    /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round.
+    /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round; empty where not all of them are
+    /// known, as at its start and once chains are given up.
     pub fn acceptances(&self) -> (Vec<f64>, Vec<f64>) {
         let counts = self.counts_by_rung();
         let steps = counts[1..].iter().map(|counts| {
@@ -380,7 +381,9 @@ impl<W: Default + Send> Sampler<W> {
             counts.steps.iter().for_each(|count| all += *count);
             all.acceptance()
         });
-        (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
+        let swaps = counts[1..].iter().map(|counts| counts.swaps.acceptance());
+        let known = |rates: Vec<f64>| if rates.iter().any(|rate| rate.is_nan()) { Vec::new() } else { rates };
+        (known(steps.collect()), known(swaps.collect()))
     }
 
     /// What became of changes of technique, in this round.
