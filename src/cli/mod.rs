@@ -46,7 +46,8 @@ Exit codes:
   1    something failed while running, such as a full disk
   2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
        relt convert: also with --strict where something would be left out
-  3    relt compare: an image exceeds a --max-… that was given
+  3    relt render --strict: the picture cannot be trusted
+       relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
   130  ended at once by a second signal, without an image
        relt reference, relt study: also by the first, before all was done; the same command goes on";

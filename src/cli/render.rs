@@ -14,7 +14,9 @@ use super::scene::SceneArguments;
 use super::{signals, values};
 use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
-use crate::render::{self, Job, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary, replay};
+use crate::render::{
+    self, Health, Job, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary, Verdict, replay,
+};
 use crate::tempering::RoundReport;
 
 /// Renders a scene to an OpenEXR image with a PNG preview
@@ -39,6 +41,10 @@ pub(super) struct Render {
     /// Writes a log, one JSON object a line
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     log: Option<PathBuf>,
+
+    /// Ends with exit code 3 where the picture cannot be trusted (verdict bad); it is written all the same
+    #[arg(long, help_heading = "Files")]
+    strict: bool,
 
     /// Shows nothing but errors
     #[arg(short, long, help_heading = "Files")]
@@ -84,13 +90,22 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     }
 
     output.write(&outcome.picture).map_err(Failure::running)?;
+    let failure = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
     audience.finished(&Summary {
         status: outcome.status,
+        health: outcome.health,
         outputs: output.files(),
         interrupted: outcome.interrupted,
         warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
     });
-    Ok(())
+    failure.map_or(Ok(()), Err)
+}
+
+/// What --strict has to say of a bad run.
+fn untrusted(health: &Health) -> Option<Failure> {
+    let bad = health.findings.iter().filter(|finding| finding.verdict == Verdict::Bad);
+    let reasons: Vec<String> = bad.map(|finding| format!("--strict: {}", finding.what)).collect();
+    (!reasons.is_empty()).then_some(Failure::Exceeded(reasons))
 }
 
 impl Render {

@@ -5,7 +5,8 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Phase, Stage, film_warnings, mean},
+    engine::{Counts, Development, Diagnostics, Engine, Phase, Stage, film_warnings, mean},
+    health::ChainReport,
     settings::{MltSettings, Normalisation},
 };
 use crate::{
@@ -14,7 +15,7 @@ use crate::{
     path::{Faults, Workspace},
     rng::{Counter, Purpose},
     sample::{Move, Points},
-    tempering::Estimate,
+    tempering::{Estimate, split_r_hat},
 };
 
 /// Independent samples of the first pass; half of the budget where that is less.
@@ -84,6 +85,23 @@ impl Mlt {
     /// The magnitude that states are kept in on the film: c as it is known before any step.
     fn unit(&self) -> f64 {
         self.first_estimate.value
+    }
+
+    /// How well chains move and agree; `None` where there are none.
+    fn report(&self) -> Option<ChainReport> {
+        let first = &self.blocks.first()?.chains;
+        let chains = || self.blocks.iter().map(|block| &block.chains);
+        let small = chains().fold((0.0, 0), |sum, chains| (sum.0 + chains.small.0, sum.1 + chains.small.1));
+        let halves = chains().flat_map(|chains| chains.halves).filter(|half| half.states > 0.0);
+        let means: Vec<f64> = halves.clone().map(|half| half.sum / half.states).collect();
+        let all = halves.reduce(|a, b| a.merged(b)).unwrap_or_default();
+        Some(ChainReport {
+            steps: first.steps(),
+            acceptance: small.0 / small.1 as f64,
+            longest_rejection_run: chains().map(|chains| u64::from(chains.longest_rejection)).max().unwrap_or(0),
+            split_r_hat: split_r_hat(&means, all.variance().sqrt()),
+            halves: means.len(),
+        })
     }
 
     /// c from all samples that the settings admit.
@@ -210,6 +228,7 @@ impl Engine for Mlt {
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
             normalisation: Some(normalisation),
             warnings: film_warnings(&self.film),
+            diagnostics: Diagnostics { chains: self.report(), ..Diagnostics::default() },
         }
     }
 }

@@ -4,6 +4,7 @@ mod baseline;
 pub mod calibration;
 pub mod clock;
 pub mod engine;
+pub mod health;
 pub mod log;
 pub mod output;
 pub mod progress;
@@ -16,6 +17,7 @@ pub mod status;
 mod tests;
 pub mod trial;
 
+pub use health::{Health, Verdict};
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};
 pub use settings::{

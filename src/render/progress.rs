@@ -263,7 +263,7 @@ fn choice(report: &RoundReport) -> String {
     [Some(format!("{} replicas", report.replicas)), uniform].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// What is said at the end: files, effort, warnings.
+/// What is said at the end: files, effort, warnings, and what is wrong with the run.
 pub fn ending(summary: &Summary) -> String {
     let status = &summary.status;
     let mut lines = Vec::new();
@@ -271,6 +271,7 @@ pub fn ending(summary: &Summary) -> String {
         lines.push(format!("interrupted: the image holds what was done, {:.1} %", 100.0 * status.fraction()));
     }
     lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(summary.health.lines());
     let files: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     lines.push(format!(
         "{} mutations in {} ({}/s{}); wrote {}",

@@ -12,8 +12,9 @@ use super::{
     baseline::Mlt,
     calibration,
     clock::Clock,
-    engine::{Engine, Phase, Stage},
-    output::{Picture, metadata},
+    engine::{Diagnostics, Engine, Phase, Stage},
+    health::{self, Evidence, Health},
+    output::{Picture, health_metadata, metadata},
     replica_exchange::ReplicaExchange,
     settings::{Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
@@ -51,6 +52,8 @@ pub struct Outcome {
     pub interrupted: bool,
     /// What the person should know, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether the picture can be trusted.
+    pub health: Health,
 }
 
 /// Why a run could not take place.
@@ -233,9 +236,28 @@ fn conclude(
         warnings.push(format!("the image lacks {missed}: --mapping {name} makes no paths to that, all others do"));
     }
     warnings.extend(non_finite(stage, &status));
-    let metadata = metadata(start, &status);
+    let Diagnostics { round, chains, contradiction } = development.diagnostics;
+    let health = health::judge(&Evidence {
+        settings: &job.settings,
+        status: &status,
+        pixels: stage.pixels(),
+        round: telling(round.as_ref(), status.last_round.as_deref()),
+        chains: chains.as_ref(),
+        contradiction,
+    });
+    let mut metadata = metadata(start, &status);
+    metadata.extend(health_metadata(&health));
     let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
-    Outcome { picture, status, mapping: start.mapping, interrupted, warnings }
+    Outcome { picture, status, mapping: start.mapping, interrupted, warnings, health }
+}
+
+/// The one of the round at work and the last that ended that knows more.
+fn telling<'a>(now: Option<&'a RoundReport>, last: Option<&'a RoundReport>) -> Option<&'a RoundReport> {
+    let steps = |round: &RoundReport| round.rungs.last().map_or(0, |rung| rung.evaluations);
+    match (now, last) {
+        (Some(now), Some(last)) if !now.rungs.is_empty() && steps(now) < steps(last) => Some(last),
+        (now, _) => now,
+    }
 }
 
 /// What to say of contributions that were settled: how many, why, and where the first of them went wrong.
@@ -320,7 +342,13 @@ mod tests {
 
         fn develop(&self, _: &Stage) -> Development {
             let image = Image::constant(1, 1, [1.0; 3]);
-            Development { image, layers: Vec::new(), normalisation: None, warnings: Vec::new() }
+            Development {
+                image,
+                layers: Vec::new(),
+                normalisation: None,
+                warnings: Vec::new(),
+                diagnostics: Diagnostics::default(),
+            }
         }
 
         fn take_reports(&mut self) -> Vec<RoundReport> {

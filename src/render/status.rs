@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::health::Health;
 use super::output::Picture;
 use super::settings::Settings;
 use crate::chain::TechniqueChanges;
@@ -158,6 +159,8 @@ pub struct Summary {
     pub interrupted: bool,
     /// What the person should know about the image, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether it can be trusted.
+    pub health: Health,
 }
 
 /// Somebody who follows a run. The render loop calls these from one thread at a time; each returns soon.
