@@ -117,8 +117,8 @@ const ROUND_TRIPS_EXPECTED: f64 = 20.0;
 /// Part of the expected round trips below which states get lost on the way.
 const ROUND_TRIPS_SHARE: f64 = 0.1;
 /// Share of its steps that one chain refused in a row. On the shipped scenes ladders of the automatic length stay below 0.15,
-/// while `caustic` with two replicas, whose picture has a bright dot there, has 0.4.
-const STUCK: [f64; 2] = [0.25, 0.6];
+/// while `caustic` with two replicas has 0.4. One chain of many spoils one place, so this is never more than doubtful.
+const STUCK: f64 = 0.25;
 /// Steps in a row from which a chain may be called stuck: a 16th of a pixel's steps at 64 mutations per pixel and 64 blocks
 /// of chains, and much more than chains refuse in a row by chance at the acceptances that are chosen.
 const STUCK_LEAST: u64 = 256;
@@ -267,9 +267,11 @@ fn trips(round: &RoundReport, find: Find) {
 
 /// A chain that refuses all that it is offered.
 fn stuck(longest: u64, steps: u64, advice: &str, find: Find) {
-    let verdict = Verdict::from(longest as f64 / steps.max(1) as f64, STUCK[0], STUCK[1]);
-    let what = format!("a chain refused {longest} mutations in a row, of {steps}: its place will be a bright dot");
-    find(verdict.filter(|_| longest >= STUCK_LEAST), what, advice);
+    let stuck = longest >= STUCK_LEAST && longest as f64 >= STUCK * steps as f64;
+    let what = format!(
+        "a chain refused {longest} mutations in a row (of late, chains made {steps} steps), which may leave a bright dot"
+    );
+    find(stuck.then_some(Verdict::Doubtful), what, advice);
 }
 
 /// Few independent states.
@@ -397,7 +399,7 @@ mod tests {
     #[test]
     fn chains_that_stand_still_or_disagree_are_told() {
         assert_told(&of_round(|r| r.longest_rejection_run = 3000), Verdict::Doubtful, "refused 3000", "render longer");
-        assert_told(&of_round(|r| r.longest_rejection_run = 7000), Verdict::Bad, "of 10000", "render longer");
+        assert_told(&of_round(|r| r.longest_rejection_run = 7000), Verdict::Doubtful, "made 10000", "render longer");
         let few = |r: &mut RoundReport| (r.longest_rejection_run, r.barrier) = (3000, 3.4);
         assert_told(&of_round(few), Verdict::Doubtful, "refused 3000", "--replicas 8");
         // 128 halves: R̂² − 1 = 128/N
@@ -433,7 +435,7 @@ mod tests {
         };
         assert_told(&of(|c| c.acceptance = 0.03), Verdict::Doubtful, "accept 3.0 %", "--method re");
         assert_told(&of(|c| c.acceptance = 0.01), Verdict::Bad, "accept 1.0 %", "--method re");
-        assert_told(&of(|c| c.longest_rejection_run = 4000), Verdict::Bad, "refused 4000", "--method re");
+        assert_told(&of(|c| c.longest_rejection_run = 4000), Verdict::Doubtful, "refused 4000", "--method re");
         assert_told(&of(|c| c.split_r_hat = 2.5), Verdict::Bad, "worth 24", "--method re");
         assert_eq!(of(|c| (c.steps, c.longest_rejection_run) = (300, 200)), Health::default(), "too short to be stuck");
     }
