@@ -31,7 +31,7 @@ pub fn lamp(radiance: &str) -> String {
 }
 
 /// A lamp in a box of its own that is closed on all sides.
-fn hidden_lamp() -> String {
+pub fn hidden_lamp() -> String {
     "<shape type='cube'><transform name='to_world'><scale value='0.2'/><translate x='0.8'/></transform>
        <bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>
      <shape type='sphere'><point name='center' value='0.8, 0, 0'/><float name='radius' value='0.1'/>
