@@ -435,3 +435,29 @@ impl<W: Default> Part<W> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    /// Replicas and offers of all ladders draw words of their own, however a ladder is cut into parts and also when there
+    /// come to be more offers. (Two that share them look right each by itself; they are no longer independent.)
+    #[test]
+    fn no_two_lanes_draw_the_same_words() {
+        let rng = Rng::new(1);
+        for (rungs, lanes_a_part) in [(2, 512), (5, 512), (5, 8), (40, 16)] {
+            let blocks = (0..3).map(|number| Block::<()>::new(rng, (number, 3), rungs, 1, lanes_a_part, 1, [1, 1]));
+            let mut blocks: Vec<Block<()>> = blocks.collect();
+            for offers in [1, 4] {
+                blocks.iter_mut().for_each(|block| block.set_offers(rng, offers));
+                let parts = blocks.iter().flat_map(|block| &block.parts);
+                let counters: Vec<Counter> = parts.flat_map(|part| part.evaluator.counters.clone()).collect();
+                let words: HashSet<[u32; 4]> = counters.iter().map(|counter| rng.words(*counter, 0)).collect();
+                assert_eq!(counters.len(), 3 * 3 * (rungs - 1 + offers));
+                assert_eq!(words.len(), counters.len(), "{rungs} rungs, {offers} offers");
+            }
+        }
+    }
+}
