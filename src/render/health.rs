@@ -141,7 +141,7 @@ pub fn judge(evidence: &Evidence) -> Health {
     non_finite(evidence, &mut find);
     ladder(evidence, &mut find);
     chains(evidence, &mut find);
-    findings.sort_by(|a: &Finding, b| b.verdict.cmp(&a.verdict));
+    findings.sort_by_key(|finding: &Finding| std::cmp::Reverse(finding.verdict));
     let verdict = findings.first().map_or(Verdict::Good, |finding| finding.verdict);
     Health { verdict, findings }
 }

@@ -48,8 +48,8 @@ fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
 /// The sum that a retraced path ends its camera's subpath with; black where it found nothing.
 fn told_sum(events: &[Event]) -> [f64; 3] {
     let own = |event: &&Event| event.quantities.iter().all(|q| q.name != "film");
-    let sums = events.iter().filter(own).flat_map(|event| &event.quantities).filter(|q| q.name == "sum so far");
-    sums.last().map_or([0.0; 3], |sum| sum.values[..].try_into().expect("three channels"))
+    let mut sums = events.iter().filter(own).flat_map(|event| &event.quantities).filter(|q| q.name == "sum so far");
+    sums.next_back().map_or([0.0; 3], |sum| sum.values[..].try_into().expect("three channels"))
 }
 
 /// What that should be.
