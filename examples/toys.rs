@@ -162,7 +162,7 @@ fn sample(toy: &Toy, ladder: LadderChoice, combine: Combine, evaluations: u64, s
     while sampler.sweeps_left() != Some(0) {
         sampler.advance(toy, u64::MAX, None);
     }
-    let Development { image, layers, learnt } = sampler.develop();
+    let Development { image, layers, learnt, .. } = sampler.develop();
     let layer = |name: &str| match layers.iter().find(|layer| layer.0 == name) {
         Some((_, Plane::Rgb(image))) => image,
         _ => panic!("no layer {name}"),

@@ -4,7 +4,7 @@
 
 use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
-    path::Whole,
+    path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -48,6 +48,13 @@ pub struct Baseline<W> {
     /// Uniform number of each lane's decision at this step.
     decisions: Vec<f64>,
     steps: u64,
+    /// Steps in a row that each chain refused, and the most that were.
+    refused: Vec<u32>,
+    /// Most steps in a row that a chain refused.
+    pub longest_rejection: u32,
+    /// ln g of states in the earlier and the later half of the steps: the later one ends with the last step and begins with
+    /// the largest power of two that is no later than that.
+    pub halves: [Moments; 2],
     /// Changes of technique.
     pub changed: TechniqueChanges,
     /// Σ of acceptance probabilities of small steps and how many there were.
@@ -78,6 +85,9 @@ impl<W: Default> Baseline<W> {
             evaluator,
             large_steps,
             decisions: vec![0.0; starts.len()],
+            refused: vec![0; starts.len()],
+            longest_rejection: 0,
+            halves: [Moments::default(); 2],
             changed: TechniqueChanges::default(),
             steps: 0,
             small: (0.0, 0),
@@ -107,6 +117,9 @@ impl<W: Default> Baseline<W> {
             self.evaluator.moves[lane] = if large { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };
         }
         self.evaluator.evaluate(target, &self.walkers.points);
+        if self.steps.is_power_of_two() {
+            self.halves = [self.halves[0].merged(self.halves[1]), Moments::default()];
+        }
         for lane in 0..self.evaluator.moves.len() {
             let proposed = self.evaluator.out.whole(lane);
             let small = self.evaluator.moves[lane] != Move::Fresh;
@@ -124,6 +137,9 @@ impl<W: Default> Baseline<W> {
             });
             let count = if small { &mut self.small } else { &mut self.large };
             *count = (count.0 + alpha, count.1 + 1);
+            self.refused[lane] = if u < alpha { 0 } else { self.refused[lane] + 1 };
+            self.longest_rejection = self.longest_rejection.max(self.refused[lane]);
+            self.halves[1].add(self.walkers.states[lane].ln_g);
         }
         self.steps += 1;
     }
@@ -161,8 +177,39 @@ impl<W: Default> Baseline<W> {
     }
 
     /// Rays traced and contributions settled so far.
-    pub fn rays_and_faults(&self) -> (u64, u64) {
-        (self.evaluator.out.rays, self.evaluator.out.non_finite)
+    pub fn rays_and_faults(&self) -> (u64, &Faults) {
+        (self.evaluator.out.rays, &self.evaluator.out.faults)
+    }
+}
+
+/// Sums of a number over states.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// How many states.
+    pub states: f64,
+    /// Σ x.
+    pub sum: f64,
+    /// Σ x².
+    pub squares: f64,
+}
+
+impl Moments {
+    #[inline(always)]
+    fn add(&mut self, x: f64) {
+        self.states += 1.0;
+        self.sum += x;
+        self.squares += x * x;
+    }
+
+    /// Of the states of both.
+    pub fn merged(self, other: Moments) -> Moments {
+        Moments { states: self.states + other.states, sum: self.sum + other.sum, squares: self.squares + other.squares }
+    }
+
+    /// Mean square of the distance from the mean; NaN without states.
+    pub fn variance(self) -> f64 {
+        let mean = self.sum / self.states;
+        (self.squares / self.states - mean * mean).max(0.0)
     }
 }
 

@@ -99,6 +99,8 @@ impl<W: Default> Evaluator<W> {
         let rays = &mut self.out.rays;
         self.given.clear(lane);
         let change = target.change_technique((current, lane), beta, &mut random, &mut self.given, rays);
+        // nothing is known of the odds of a change that is not finite: it must not reach an acceptance probability
+        let change = change.filter(|expected| expected.is_finite());
         self.moves[lane] = if change.is_some() { Move::Given } else { Move::Rest };
         self.expected[lane] = change.unwrap_or(0.0);
         change.is_some()
@@ -122,5 +124,53 @@ impl<W: Default> Evaluator<W> {
             walkers.replace(lane, (&self.points, lane), &self.out, record);
         }
         Some(alpha)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        path::Contributions,
+        rng::Rng,
+        sample::{Block, Proposals},
+    };
+
+    /// Has nothing but changes of technique, whose expected change of ln g is known beforehand.
+    struct Expecting(f64);
+
+    impl Target for Expecting {
+        type Workspace = ();
+
+        fn evaluate(&self, _: &mut Proposals, _: &mut Contributions, _: &mut ()) {}
+
+        fn change_technique(
+            &self,
+            _: (&Points, usize),
+            _: f64,
+            _: &mut dyn FnMut() -> Block,
+            _: &mut Points,
+            _: &mut u64,
+        ) -> Option<f64> {
+            Some(self.0)
+        }
+    }
+
+    #[test]
+    fn a_change_of_unknown_odds_is_none() {
+        for (expected, changes) in [(0.5, true), (f64::NAN, false), (f64::INFINITY, false), (f64::NEG_INFINITY, false)]
+        {
+            let counter = Counter { ladder: 0, replica: 0, step: 0, purpose: Purpose::Primary };
+            let mut evaluator = Evaluator::<()>::new(Rng::new(1), vec![counter]);
+            assert_eq!(
+                evaluator.change_technique(&Expecting(expected), &Points::new(1), 0, 1.0),
+                changes,
+                "{expected}"
+            );
+            assert_eq!(evaluator.moves[0] == Move::Rest, !changes);
+            assert!(evaluator.expected[0].is_finite());
+            let alpha = evaluator.settle_change(&mut Walkers::new(1), 0, 1.0, &mut |_, _| {});
+            assert_eq!(alpha.is_some(), changes, "{expected}: {alpha:?}");
+        }
     }
 }

@@ -80,7 +80,8 @@ impl Importance {
             let mut means: Vec<f64> = (top..(top + tile).min(height)).filter_map(row).collect();
             means.sort_by(f64::total_cmp);
             let luminance = means.get(means.len() / 2).copied().unwrap_or(mean);
-            -libm::log(luminance / mean + FLOOR)
+            // filters with negative lobes may leave a dark tile beside a bright one below 0
+            -libm::log((luminance / mean).max(0.0) + FLOOR)
         });
         Importance { size: [width as f32, height as f32], tile, columns, ln_weights: ln_weights.collect() }
     }
@@ -111,6 +112,16 @@ mod tests {
         path::{Contribution, Elsewhere, FilmSplat},
         scene::Rgb,
     };
+
+    /// A filter with negative lobes swings below 0 beside a lamp; chains must not be told NaN there.
+    #[test]
+    fn tiles_below_zero_are_wanted_as_dark_ones_are() {
+        let mut found = vec![[1.0, 1.0]; 256];
+        (0..256).filter(|i| i % 16 >= 12).for_each(|i| found[i] = [100.0, 1.0]);
+        (0..256).filter(|i| i % 16 < 12).for_each(|i| found[i] = [-30.0, 1.0]);
+        let importance = Importance::new([16, 16], &found);
+        assert_eq!(importance.ln_at([0.1, 0.1]), -(0.5f64).ln());
+    }
 
     #[test]
     fn bright_tiles_count_less_and_single_bright_samples_nothing() {

@@ -156,7 +156,9 @@ impl<W: Default> Evaluator<W> {
         if let Some(importance) = &self.importance {
             for (lane, how) in self.moves.iter().enumerate() {
                 if *how != Move::Rest {
-                    self.out.lanes[lane].ln_g = importance.ln_weighed(self.out.whole(lane));
+                    let ln_g = importance.ln_weighed(self.out.whole(lane));
+                    debug_assert!(ln_g < f64::INFINITY, "importance is finite, contributions are settled");
+                    self.out.lanes[lane].ln_g = ln_g;
                 }
             }
         }

@@ -8,6 +8,8 @@ mod ladder;
 mod loading;
 mod reference;
 mod render;
+mod replay;
+mod run_options;
 mod scene;
 mod signals;
 mod study;
@@ -30,6 +32,7 @@ struct Arguments {
 enum Command {
     Render(Box<render::Render>),
     Info(info::Info),
+    Replay(Box<replay::Replay>),
     Ladder(ladder::Ladder),
     Study(study::StudyArguments),
     Compare(compare::Compare),
@@ -43,7 +46,8 @@ Exit codes:
   1    something failed while running, such as a full disk
   2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
        relt convert: also with --strict where something would be left out
-  3    relt compare: an image exceeds a --max-… that was given
+  3    relt render --strict: the picture cannot be trusted
+       relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
   130  ended at once by a second signal, without an image
        relt reference, relt study: also by the first, before all was done; the same command goes on";
@@ -61,6 +65,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.command {
         Command::Render(arguments) => render::run(*arguments),
         Command::Info(arguments) => info::run(arguments),
+        Command::Replay(arguments) => replay::run(*arguments),
         Command::Ladder(arguments) => ladder::run(arguments),
         Command::Study(arguments) => study::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),

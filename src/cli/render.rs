@@ -9,15 +9,13 @@ use std::time::Duration;
 use clap::Args;
 
 use super::failure::Failure;
+use super::run_options::RunOptions;
 use super::scene::SceneArguments;
 use super::{signals, values};
-use crate::path::MappingKind;
 use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
-use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer, Output,
-    PacketChoice, Picture, RunStart, Settings, Status, Summary,
+    self, Health, Job, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary, Verdict, replay,
 };
 use crate::tempering::RoundReport;
 
@@ -27,6 +25,9 @@ use crate::tempering::RoundReport;
 pub(super) struct Render {
     #[command(flatten)]
     scene: SceneArguments,
+
+    #[command(flatten)]
+    run: RunOptions,
 
     /// Image to write: .exr (32-bit floats, with a .png preview beside it) or .png (preview only)
     /// [default: the scene's folder's name with .exr, in the current folder]
@@ -41,6 +42,10 @@ pub(super) struct Render {
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     log: Option<PathBuf>,
 
+    /// Ends with exit code 3 where the picture cannot be trusted (verdict bad); it is written all the same
+    #[arg(long, help_heading = "Files")]
+    strict: bool,
+
     /// Shows nothing but errors
     #[arg(short, long, help_heading = "Files")]
     quiet: bool,
@@ -49,76 +54,9 @@ pub(super) struct Render {
     #[arg(short, long, help_heading = "Files")]
     verbose: bool,
 
-    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
-    #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
-    method: Method,
-
-    /// Replicas on a ladder for --method re, 1 to 1024, the uniform one included, placed at equal rejection of swaps;
-    /// auto: as many as pay, none but the uniform one where path tracing is best [default: auto]
-    #[arg(long, value_name = "K", value_parser = values::replicas, allow_hyphen_values = true, help_heading = "Method")]
-    replicas: Option<LadderChoice>,
-
-    /// From random numbers to light paths; unidirectional: camera paths; light: light subpaths seen by the camera;
-    /// two-way: both; bidirectional: both, and every vertex of one joined to every vertex of the other; multiplexed: one of
-    /// those ways for each mutation; auto: a short trial on the scene decides
-    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = values::mapping(), help_heading = "Method")]
-    mapping: MappingChoice,
-
-    /// Lets chains on --mapping multiplexed change the technique of a path and keep the path [default: off]
-    #[arg(long, value_name = "WHETHER", value_parser = values::switch(), help_heading = "Method")]
-    technique_changes: Option<bool>,
-
-    /// Inverse temperatures for --method re in place of --replicas, rising from 0 to 1, such as 0,0.3,1
-    #[arg(long, value_name = "0,…,1", value_delimiter = ',', allow_negative_numbers = true, help_heading = "Method")]
-    betas: Option<Vec<f64>>,
-
-    /// Share of evaluations of --method re that are uniform points, between 0 and 1 [default: tuned to the scene]
-    #[arg(long, value_name = "F", allow_negative_numbers = true, help_heading = "Method")]
-    uniform_share: Option<f64>,
-
-    /// How --method re makes one image of its replicas; balance: all samples of all, weighed; target: the coldest's;
-    /// uniform: the uniform one's; max, power, median, median-printed: the paper's heuristics of the latter two, biased
-    /// [default: balance]
-    #[arg(long, value_parser = values::combine(), help_heading = "Method")]
-    combine: Option<Combine>,
-
-    /// The error that --method re makes small: relative to the luminance of a pixel, or absolute [default: relative]
-    #[arg(long, value_parser = values::measure(), help_heading = "Method")]
-    error: Option<Measure>,
-
     /// Adds to the .exr of --method re the images of the uniform and the coldest replica, and each rung's part
     #[arg(long, help_heading = "Files")]
     layers: bool,
-
-    /// Probability of a large step for --method mlt, between 0 and 1 [default: 0.3]
-    #[arg(long, value_name = "P", allow_negative_numbers = true, help_heading = "Method")]
-    large_steps: Option<f64>,
-
-    /// Samples that --method mlt takes the mean luminance from; two-pass: those before the chains start; pooled: those
-    /// and all large steps [default: two-pass]
-    #[arg(long, value_parser = values::normalisation(), help_heading = "Method")]
-    normalisation: Option<Normalisation>,
-
-    /// Lets --method mlt use large steps in the image also as independent samples, by Kelemen's weights
-    #[arg(long, help_heading = "Method")]
-    kelemen_weights: bool,
-
-    /// Mutations per pixel, above 0; the same seed and number give the same image, bit by bit
-    /// [default: 64 unless --time is given; with both, whichever ends first]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
-    mpp: Option<f64>,
-
-    /// Wall time to render for, such as 60s or 5m
-    #[arg(long, value_parser = values::duration, allow_hyphen_values = true, help_heading = "Budget")]
-    time: Option<Duration>,
-
-    /// Seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Budget")]
-    seed: u64,
-
-    /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
-    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
-    threads: Option<usize>,
 
     /// Keeps every worker thread on a core of its own
     #[arg(long, help_heading = "Machine")]
@@ -133,7 +71,7 @@ pub(super) struct Render {
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let output = arguments.output()?;
-    let opened = arguments.scene.open(arguments.threads, arguments.quiet)?;
+    let opened = arguments.scene.open(arguments.run.threads, arguments.quiet)?;
     let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());
@@ -144,16 +82,30 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
 
     let scene_name = arguments.scene.path.display().to_string();
     let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
-    let outcome = render::run(&job, &audience).map_err(Failure::running)?;
+    let mut outcome = render::run(&job, &audience).map_err(Failure::running)?;
+    if let Some(fault) = outcome.status.faults.first() {
+        let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
+        let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
+        outcome.warnings.push(format!("the first of those paths: {command}"));
+    }
 
     output.write(&outcome.picture).map_err(Failure::running)?;
+    let failure = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
     audience.finished(&Summary {
         status: outcome.status,
+        health: outcome.health,
         outputs: output.files(),
         interrupted: outcome.interrupted,
         warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
     });
-    Ok(())
+    failure.map_or(Ok(()), Err)
+}
+
+/// What --strict has to say of a bad run.
+fn untrusted(health: &Health) -> Option<Failure> {
+    let bad = health.findings.iter().filter(|finding| finding.verdict == Verdict::Bad);
+    let reasons: Vec<String> = bad.map(|finding| format!("--strict: {}", finding.what)).collect();
+    (!reasons.is_empty()).then_some(Failure::Exceeded(reasons))
 }
 
 impl Render {
@@ -167,32 +119,7 @@ impl Render {
 
     /// The run that is asked for, or everything that is wrong with it.
     pub(super) fn settings(&self) -> Result<Settings, Failure> {
-        let no_budget = self.mpp.is_none() && self.time.is_none();
-        let settings = Settings {
-            method: self.method,
-            mapping: self.mapping,
-            seed: self.seed,
-            threads: self.threads,
-            pin: self.pin,
-            mutations_per_pixel: if no_budget { Some(DEFAULT_MUTATIONS_PER_PIXEL) } else { self.mpp },
-            time: self.time,
-            ladder: match (&self.betas, &self.replicas) {
-                (Some(betas), _) => LadderChoice::Betas(betas.clone()),
-                (None, Some(replicas)) => replicas.clone(),
-                (None, None) => LadderChoice::default(),
-            },
-            combine: self.combine.unwrap_or_default(),
-            uniform_share: self.uniform_share,
-            measure: self.error.unwrap_or_default(),
-            layers: self.layers,
-            technique_changes: self.technique_changes.unwrap_or(Settings::default().technique_changes),
-            mlt: MltSettings {
-                large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
-                normalisation: self.normalisation.unwrap_or_default(),
-                kelemen_weights: self.kelemen_weights,
-            },
-            packet: self.packet,
-        };
+        let settings = Settings { layers: self.layers, pin: self.pin, packet: self.packet, ..self.run.settings() };
         let mut faults = self.contradictions();
         faults.extend(settings.faults());
         if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
@@ -204,42 +131,9 @@ impl Render {
         if self.quiet && self.verbose {
             faults.push("--quiet and --verbose: give one of them".into());
         }
-        if self.betas.is_some() && self.replicas.is_some() {
-            faults.push("--betas and --replicas: give one of them; the number of replicas is that of the betas".into());
-        }
-        let of_a_ladder = [
-            ("--replicas", self.replicas.is_some()),
-            ("--betas", self.betas.is_some()),
-            ("--combine", self.combine.is_some()),
-            ("--uniform-share", self.uniform_share.is_some()),
-            ("--error", self.error.is_some()),
-            ("--layers", self.layers),
-            ("--verbose", self.verbose),
-        ];
-        if self.method != Method::ReplicaExchange {
-            let method = self.method.name();
-            let given = of_a_ladder.iter().filter(|(_, given)| *given);
-            faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
-        }
-        let multiplexed = self.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
-        if self.technique_changes == Some(true) && !(multiplexed && self.method != Method::Path) {
-            faults.push(
-                "--technique-changes on: only chains of --method mlt or re on --mapping multiplexed have a technique to change"
-                    .into(),
-            );
-        }
-        let of_large_steps = [
-            ("--large-steps", self.large_steps.is_some()),
-            ("--normalisation", self.normalisation.is_some()),
-            ("--kelemen-weights", self.kelemen_weights),
-        ];
-        if self.method != Method::Mlt {
-            let method = self.method.name();
-            let given = of_large_steps.iter().filter(|(_, given)| *given);
-            faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no large steps; only mlt has")));
-        }
+        faults.extend(self.run.contradictions(&[("--layers", self.layers), ("--verbose", self.verbose)]));
         let cores = available_parallelism().map_or(1, usize::from);
-        if let Some(threads) = self.threads.filter(|threads| self.pin && *threads > cores) {
+        if let Some(threads) = self.run.threads.filter(|threads| self.pin && *threads > cores) {
             faults.push(format!("--pin: {threads} threads cannot have a core each, relt may use {cores}"));
         }
         faults
@@ -345,6 +239,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
+    use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation};
 
     #[derive(Parser)]
     struct Only {

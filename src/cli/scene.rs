@@ -42,6 +42,12 @@ impl SceneArguments {
             .collect()
     }
 
+    /// The words of the command line that name the same scene.
+    pub fn in_words(&self) -> String {
+        let defines = self.defines.iter().map(|(name, value)| format!(" -D {name}={value}"));
+        std::iter::once(self.path.display().to_string()).chain(defines).collect()
+    }
+
     /// Reads the file and builds the scene, on so many threads or as many as the machine runs at once; shows how far that
     /// is, unless `quiet`.
     pub fn open(&self, threads: Option<usize>, quiet: bool) -> Result<Opened, Failure> {

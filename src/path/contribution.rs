@@ -1,5 +1,6 @@
 //! What a point contributes to the image, and the scalar that chains follow.
 
+use super::faults::{Cause, Causes, Faults};
 use crate::scene::Rgb;
 
 /// Luminance with the paper's weights (Rec. 601): 0.299 R + 0.587 G + 0.114 B. Non-negative colours have
@@ -33,29 +34,29 @@ impl Contribution {
     /// The contribution of radiance `rgb` at a film position and nothing elsewhere, and whether it had to be settled; see
     /// [`settle_whole`](Self::settle_whole).
     #[inline(always)]
-    pub fn settle(film: [f32; 2], rgb: Rgb) -> (Contribution, bool) {
-        let (rgb, fault) = settled(rgb);
-        (Contribution::of(film, rgb, luminance(rgb)), fault)
+    pub fn settle(film: [f32; 2], rgb: Rgb) -> (Contribution, Causes) {
+        let mut causes = Causes::NONE;
+        let rgb = settled(rgb, &mut causes);
+        (Contribution::of(film, rgb, luminance(rgb)), causes)
     }
 
-    /// The contribution of radiance `rgb` at a film position and of what a lane gives elsewhere, and the number of those
-    /// that had to be settled: a value that is not finite or negative contributes nothing. This is the one place where
+    /// The contribution of radiance `rgb` at a film position and of what a lane gives elsewhere, and why how many of those
+    /// had to be settled: a value that is not finite or negative contributes nothing. This is the one place where
     /// that is decided; a NaN that got as far as an acceptance probability would be accepted for ever.
-    pub fn settle_whole(film: [f32; 2], rgb: Rgb, elsewhere: &mut Elsewhere, lane: usize) -> (Contribution, u64) {
-        let (rgb, fault) = settled(rgb);
+    pub fn settle_whole(film: [f32; 2], rgb: Rgb, elsewhere: &mut Elsewhere, lane: usize) -> (Contribution, Causes) {
+        let mut causes = Causes::NONE;
+        let rgb = settled(rgb, &mut causes);
         let mut total = luminance(rgb);
-        let mut faults = u64::from(fault);
         for splat in elsewhere.of_mut(lane) {
-            let (rgb, fault) = settled(splat.rgb);
-            splat.rgb = rgb;
-            faults += u64::from(fault);
-            total += luminance(rgb);
+            splat.rgb = settled(splat.rgb, &mut causes);
+            total += luminance(splat.rgb);
         }
         if total == f32::INFINITY {
             elsewhere.clear(lane);
-            return (Contribution { film, ..Contribution::NONE }, faults + 1);
+            causes.add(Cause::Overflow);
+            return (Contribution { film, ..Contribution::NONE }, causes);
         }
-        (Contribution::of(film, rgb, total), faults)
+        (Contribution::of(film, rgb, total), causes)
     }
 
     fn of(film: [f32; 2], rgb: Rgb, luminance: f32) -> Contribution {
@@ -81,16 +82,18 @@ impl Contribution {
     }
 }
 
-/// A colour that can be trusted in the place of `rgb`, and whether that was at fault. A luminance that underflows is
-/// darkness, not a fault.
+/// A colour that can be trusted in the place of `rgb`; `causes` is told where that was at fault. A luminance that
+/// underflows is darkness, not a fault.
 #[inline(always)]
-fn settled(rgb: Rgb) -> (Rgb, bool) {
+fn settled(rgb: Rgb, causes: &mut Causes) -> Rgb {
     let g = luminance(rgb);
     if g > 0.0 && g < f32::INFINITY && rgb.min_element() >= 0.0 {
-        return (rgb, false);
+        return rgb;
     }
-    let fault = rgb != Rgb::ZERO && !(g == 0.0 && rgb.is_finite() && rgb.min_element() >= 0.0);
-    (Rgb::ZERO, fault)
+    if rgb != Rgb::ZERO && !(g == 0.0 && rgb.is_finite() && rgb.min_element() >= 0.0) {
+        causes.add(Cause::of(rgb));
+    }
+    Rgb::ZERO
 }
 
 /// What a point adds to one place of the film.
@@ -130,17 +133,15 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Settles the outcome as a [`Contribution`] is, and finds ln g for chains that follow the luminance. Returns the
-    /// number of values that were not finite.
-    pub fn settle(&mut self) -> u64 {
-        let (rgb, fault) = settled(self.splat.rgb);
+    /// Settles the outcome as a [`Contribution`] is, and finds ln g for chains that follow the luminance.
+    pub fn settle(&mut self, causes: &mut Causes) {
+        let rgb = settled(self.splat.rgb, causes);
         self.splat.rgb = rgb;
         self.ln_g = if rgb == Rgb::ZERO || self.chance == 0.0 {
             f64::NEG_INFINITY
         } else {
             libm::log(self.splat.luminance()) - libm::log(f64::from(self.chance))
         };
-        u64::from(fault)
     }
 }
 
@@ -248,8 +249,8 @@ pub struct Contributions {
     pub outcomes: Lists<Outcome>,
     /// Rays traced since the counter was last taken.
     pub rays: u64,
-    /// Contributions settled because they were not finite since the counter was last taken.
-    pub non_finite: u64,
+    /// Contributions settled since they were last taken.
+    pub faults: Faults,
 }
 
 impl Contributions {
@@ -260,7 +261,7 @@ impl Contributions {
             elsewhere: Elsewhere::new(lanes),
             outcomes: Lists::new(lanes),
             rays: 0,
-            non_finite: 0,
+            faults: Faults::default(),
         }
     }
 
@@ -278,17 +279,17 @@ mod tests {
     #[test]
     fn what_is_not_finite_contributes_nothing_and_is_counted() {
         for bad in [f32::NAN, f32::INFINITY, -1.0] {
-            let (c, fault) = Contribution::settle([0.5; 2], Rgb::new(1.0, bad, 1.0));
-            assert!(c.is_dark() && fault, "{bad}");
+            let (c, causes) = Contribution::settle([0.5; 2], Rgb::new(1.0, bad, 1.0));
+            assert!(c.is_dark() && causes.total() == 1, "{bad}");
         }
-        let (c, fault) = Contribution::settle([0.5; 2], Rgb::ZERO);
-        assert!(c.is_dark() && !fault);
+        let (c, causes) = Contribution::settle([0.5; 2], Rgb::ZERO);
+        assert!(c.is_dark() && causes.is_none());
     }
 
     #[test]
     fn ln_g_is_the_logarithm_of_luminance() {
-        let (c, fault) = Contribution::settle([0.1, 0.2], Rgb::new(1.0, 2.0, 3.0));
-        assert!(!fault && (c.ln_g - f64::from(0.299 + 2.0 * 0.587 + 3.0 * 0.114f32).ln()).abs() < 1e-6);
+        let (c, causes) = Contribution::settle([0.1, 0.2], Rgb::new(1.0, 2.0, 3.0));
+        assert!(causes.is_none() && (c.ln_g - f64::from(0.299 + 2.0 * 0.587 + 3.0 * 0.114f32).ln()).abs() < 1e-6);
     }
 
     #[test]
@@ -312,12 +313,15 @@ mod tests {
         for value in [2.0, f32::NAN, 3.0] {
             elsewhere.push(0, FilmSplat { film: [0.5; 2], rgb: Rgb::splat(value) });
         }
-        let (c, faults) = Contribution::settle_whole([0.1; 2], Rgb::splat(1.0), &mut elsewhere, 0);
-        assert_eq!((c.luminance, faults), (6.0, 1));
+        let (c, causes) = Contribution::settle_whole([0.1; 2], Rgb::splat(1.0), &mut elsewhere, 0);
+        assert_eq!((c.luminance, causes), (6.0, Cause::NotANumber.into()));
         assert_eq!(elsewhere.of(0).iter().map(|s| s.rgb.x).collect::<Vec<_>>(), [2.0, 0.0, 3.0]);
         elsewhere.push(0, FilmSplat { film: [0.5; 2], rgb: Rgb::splat(f32::MAX) });
         elsewhere.push(0, FilmSplat { film: [0.5; 2], rgb: Rgb::splat(f32::MAX) });
-        let (c, faults) = Contribution::settle_whole([0.1; 2], Rgb::splat(1.0), &mut elsewhere, 0);
-        assert!(c.is_dark() && faults == 1 && elsewhere.of(0).is_empty(), "a sum beyond the range of f32");
+        let (c, causes) = Contribution::settle_whole([0.1; 2], Rgb::splat(1.0), &mut elsewhere, 0);
+        assert!(
+            c.is_dark() && causes == Cause::Overflow.into() && elsewhere.of(0).is_empty(),
+            "a sum beyond the range of f32"
+        );
     }
 }

@@ -1,15 +1,20 @@
 //! The mappings and the choice among them.
 
+use std::sync::OnceLock;
+
 use serde::Serialize;
 
 use super::{
-    Contributions, Layout, RecordedRays, Widths, bidirectional,
+    Causes, Contribution, Contributions, Elsewhere, Evaluation, Event, Layout, Narration, Origin, RecordedRays, Widths,
+    bidirectional,
     bidirectional::{Lengths, Techniques},
+    scalar,
     tracing::Tracing,
     unidirectional,
 };
 use crate::{
-    sample::{Block, Points, Proposals},
+    rng::{Counter, Rng},
+    sample::{Block, Move, Points, Proposals},
     scene::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile, Scene},
 };
 
@@ -81,6 +86,8 @@ impl MappingKind {
 }
 
 type Evaluate = fn(&Mapping, &mut Proposals, &mut Contributions, &mut Workspace);
+/// Goes through the point of a lane, with its choice left open or not.
+type Walk = fn(&Mapping, &mut Proposals, (usize, bool), &mut Narration) -> (Contribution, Elsewhere, Causes);
 
 /// The mapping of one scene.
 pub struct Mapping<'s> {
@@ -93,6 +100,27 @@ pub struct Mapping<'s> {
     technique_changes: bool,
     evaluate: Evaluate,
     evaluate_open: Option<Evaluate>,
+    walk: Walk,
+    /// An evaluation to look out for, where somebody asked for one.
+    watch: Option<Watch>,
+}
+
+/// Looks out for the evaluation that draws the words of a counter.
+struct Watch {
+    counter: Counter,
+    seen: OnceLock<Evaluation>,
+}
+
+impl Watch {
+    /// Keeps the evaluation, if it is among these.
+    #[cold]
+    fn look(&self, proposals: &Proposals) {
+        let lane = (0..proposals.lanes())
+            .find(|lane| proposals.counters[*lane] == self.counter && proposals.moves[*lane] != Move::Rest);
+        if let Some(evaluation) = lane.and_then(|lane| Evaluation::of(proposals, lane)) {
+            self.seen.get_or_init(|| evaluation);
+        }
+    }
 }
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
@@ -130,10 +158,10 @@ impl<'s> Mapping<'s> {
     /// The mapping by a given kernel, which must do all that the scene needs.
     pub fn with_kernel(scene: &'s Scene, kind: MappingKind, widths: Widths, kernel: Kernel) -> Mapping<'s> {
         assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
-        let (evaluate, open): (Evaluate, Evaluate) = match kernel {
-            Kernel::Diffuse => (evaluate::<DiffuseProfile>(kind), bidirectional::open::<DiffuseProfile>),
-            Kernel::Plain => (evaluate::<PlainProfile>(kind), bidirectional::open::<PlainProfile>),
-            Kernel::Full => (evaluate::<FullProfile>(kind), bidirectional::open::<FullProfile>),
+        let (evaluate, open, walk): (Evaluate, Evaluate, Walk) = match kernel {
+            Kernel::Diffuse => kernels::<DiffuseProfile>(kind),
+            Kernel::Plain => kernels::<PlainProfile>(kind),
+            Kernel::Full => kernels::<FullProfile>(kind),
         };
         let layout = Layout::new(&scene.features, kind == MappingKind::Multiplexed);
         Mapping {
@@ -145,6 +173,8 @@ impl<'s> Mapping<'s> {
             technique_changes: false,
             evaluate,
             evaluate_open: (kind == MappingKind::Multiplexed).then_some(open),
+            walk,
+            watch: None,
         }
     }
 
@@ -209,12 +239,79 @@ impl<'s> Mapping<'s> {
     pub fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
         let evaluate = self.evaluate_open.expect("points of other mappings have one outcome");
         evaluate(self, proposals, out, workspace);
+        if let Some(watch) = &self.watch {
+            watch.look(proposals);
+        }
     }
 
     /// Evaluates the proposals of all lanes that do not rest.
     pub fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
         (self.evaluate)(self, proposals, out, workspace);
+        if let Some(watch) = &self.watch {
+            watch.look(proposals);
+        }
     }
+
+    /// Looks out for the evaluation that draws the words of that counter.
+    pub fn watching(mut self, counter: Counter) -> Self {
+        self.watch = Some(Watch { counter, seen: OnceLock::new() });
+        self
+    }
+
+    /// The evaluation that was looked out for, once it has been.
+    pub fn watched(&self) -> Option<&Evaluation> {
+        self.watch.as_ref().and_then(|watch| watch.seen.get())
+    }
+
+    /// Evaluates the proposal of one lane and tells how, the same to the bit as in a batch; of a point that leaves `open` what
+    /// it chooses, the sum of all outcomes.
+    pub fn walk(
+        &self,
+        proposals: &mut Proposals,
+        (lane, open): (usize, bool),
+        narration: &mut Narration,
+    ) -> (Contribution, Elsewhere, Causes) {
+        (self.walk)(self, proposals, (lane, open), narration)
+    }
+
+    /// Goes through an evaluation once more: what it contributes, there and elsewhere, why that had to be settled, and all
+    /// that happens on the way.
+    pub fn retrace(&self, evaluation: &Evaluation) -> Retraced {
+        let given = evaluation.point.to_points();
+        let (counters, moves) = ([evaluation.counter], [Move::Given]);
+        let mut points = Points::new(1);
+        let mut proposals = Proposals {
+            rng: Rng::new(0), // all blocks are given
+            current: &given,
+            given: &given,
+            points: &mut points,
+            counters: &counters,
+            moves: &moves,
+            film: [1, 1],
+        };
+        proposals.begin(&mut Vec::new());
+        let mut narration = Narration::kept();
+        let (contribution, elsewhere, causes) =
+            self.walk(&mut proposals, (0, evaluation.origin == Origin::Open), &mut narration);
+        Retraced { contribution, elsewhere, causes, events: narration.events() }
+    }
+}
+
+/// An evaluation, told.
+pub struct Retraced {
+    /// What the point contributes.
+    pub contribution: Contribution,
+    /// What it gives to the film elsewhere; of one lane.
+    pub elsewhere: Elsewhere,
+    /// Why how many of its values had to be settled.
+    pub causes: Causes,
+    /// What happens on the way, in order.
+    pub events: Vec<Event>,
+}
+
+/// The batch, the batch of open points, and what goes through one point.
+fn kernels<P: Profile>(kind: MappingKind) -> (Evaluate, Evaluate, Walk) {
+    (evaluate::<P>(kind), bidirectional::open::<P>, walk::<P>(kind))
 }
 
 fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
@@ -222,5 +319,15 @@ fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
         MappingKind::Unidirectional => unidirectional::evaluate::<P>,
         MappingKind::Multiplexed => bidirectional::multiplexed::<P>,
         _ => bidirectional::evaluate::<P>,
+    }
+}
+
+fn walk<P: Profile>(kind: MappingKind) -> Walk {
+    match kind {
+        MappingKind::Unidirectional => |mapping, proposals, (lane, _), narration| {
+            let (contribution, causes) = scalar::walk::<P>(mapping.scene, &mapping.layout, proposals, lane, narration);
+            (contribution, Elsewhere::new(1), causes)
+        },
+        _ => bidirectional::scalar::walk::<P>,
     }
 }

@@ -5,14 +5,18 @@
 
 pub mod bidirectional;
 mod contribution;
+mod faults;
 mod layout;
 mod mapping;
 pub mod scalar;
 mod tracing;
 mod unidirectional;
 mod vertex;
+mod walk;
 
 pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Lists, Outcome, Whole, luminance};
+pub use faults::{Cause, Causes, Evaluation, Fault, Faults, Origin, Point};
 pub use layout::Layout;
-pub use mapping::{Mapping, MappingKind, Workspace};
+pub use mapping::{Mapping, MappingKind, Retraced, Workspace};
 pub use tracing::{RecordedRays, Widths};
+pub use walk::{Event, Narration, Quantity, first_fault};

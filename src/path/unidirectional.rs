@@ -161,9 +161,11 @@ fn collect_emission<P: Profile>(scene: &Scene, w: &mut Arrays) {
 fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != crate::sample::Move::Rest {
-            let (contribution, fault) = Contribution::settle(w.film[lane], w.radiance[lane]);
+            let (contribution, causes) = Contribution::settle(w.film[lane], w.radiance[lane]);
             out.lanes[lane] = contribution;
-            out.non_finite += u64::from(fault);
+            if !causes.is_none() {
+                out.faults.note(causes, proposals, lane);
+            }
         }
     }
 }

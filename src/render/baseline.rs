@@ -5,16 +5,17 @@
 use rayon::prelude::*;
 
 use super::{
-    engine::{Counts, Development, Engine, Phase, Stage, film_warnings, mean},
+    engine::{Counts, Development, Diagnostics, Engine, Phase, Stage, film_warnings, mean},
+    health::ChainReport,
     settings::{MltSettings, Normalisation},
 };
 use crate::{
     chain::{Baseline, Evaluator, LargeSteps, Plan, Start, baseline_layer, resample},
     film::{Accumulator, Plane, Splats},
-    path::Workspace,
+    path::{Faults, Workspace},
     rng::{Counter, Purpose},
     sample::{Move, Points},
-    tempering::Estimate,
+    tempering::{Estimate, split_r_hat},
 };
 
 /// Independent samples of the first pass; half of the budget where that is less.
@@ -35,7 +36,7 @@ pub struct Mlt {
     bootstrap: Vec<(f64, f64)>,
     bootstrap_samples: u64,
     bootstrap_rays: u64,
-    bootstrap_faults: u64,
+    bootstrap_faults: Faults,
     /// c from the first pass alone, also the magnitude that states are kept in on the film.
     first_estimate: Estimate,
 }
@@ -55,6 +56,8 @@ impl Mlt {
         let bootstrap: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
+        let mut bootstrap_faults = Faults::default();
+        batches.iter().for_each(|batch| bootstrap_faults.merge(&batch.faults));
         // a black scene has no state to start from: no chains, a black image
         let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
         let blocks = starts
@@ -73,7 +76,7 @@ impl Mlt {
             pools: settings.normalisation == Normalisation::Pooled,
             bootstrap_samples,
             bootstrap_rays: batches.iter().map(|b| b.rays).sum(),
-            bootstrap_faults: batches.iter().map(|b| b.faults).sum(),
+            bootstrap_faults,
             first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
         }
@@ -82,6 +85,23 @@ impl Mlt {
     /// The magnitude that states are kept in on the film: c as it is known before any step.
     fn unit(&self) -> f64 {
         self.first_estimate.value
+    }
+
+    /// How well chains move and agree; `None` where there are none.
+    fn report(&self) -> Option<ChainReport> {
+        let first = &self.blocks.first()?.chains;
+        let chains = || self.blocks.iter().map(|block| &block.chains);
+        let small = chains().fold((0.0, 0), |sum, chains| (sum.0 + chains.small.0, sum.1 + chains.small.1));
+        let halves = chains().flat_map(|chains| chains.halves).filter(|half| half.states > 0.0);
+        let means: Vec<f64> = halves.clone().map(|half| half.sum / half.states).collect();
+        let all = halves.reduce(|a, b| a.merged(b)).unwrap_or_default();
+        Some(ChainReport {
+            steps: first.steps(),
+            acceptance: small.0 / small.1 as f64,
+            longest_rejection_run: chains().map(|chains| u64::from(chains.longest_rejection)).max().unwrap_or(0),
+            split_r_hat: split_r_hat(&means, all.variance().sqrt()),
+            halves: means.len(),
+        })
     }
 
     /// c from all samples that the settings admit.
@@ -106,7 +126,7 @@ impl Mlt {
 struct Batch {
     ln_g: Vec<f64>,
     rays: u64,
-    faults: u64,
+    faults: Faults,
 }
 
 fn bootstrap_counter(sample: u64) -> Counter {
@@ -128,7 +148,7 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
             evaluator.moves.fill(Move::Fresh);
             evaluator.evaluate(&stage.mapping, &Points::new(0));
             let out = evaluator.out;
-            Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.non_finite }
+            Batch { ln_g: out.lanes.iter().map(|c| c.ln_g).collect(), rays: out.rays, faults: out.faults }
         })
         .collect()
 }
@@ -167,7 +187,7 @@ impl Engine for Mlt {
         let mut counts = Counts {
             mutations: self.bootstrap_samples,
             rays: self.bootstrap_rays,
-            non_finite: self.bootstrap_faults,
+            faults: self.bootstrap_faults.clone(),
             ..Counts::default()
         };
         let mut accepted = (0.0, 0);
@@ -175,7 +195,7 @@ impl Engine for Mlt {
             let (rays, faults) = block.chains.rays_and_faults();
             counts.mutations += block.chains.mutations();
             counts.rays += rays;
-            counts.non_finite += faults;
+            counts.faults.merge(faults);
             counts.technique_changes.merge(&block.chains.changed);
             for (sum, n) in [block.chains.small, block.chains.large] {
                 accepted = (accepted.0 + sum, accepted.1 + n);
@@ -208,6 +228,7 @@ impl Engine for Mlt {
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
             normalisation: Some(normalisation),
             warnings: film_warnings(&self.film),
+            diagnostics: Diagnostics { chains: self.report(), ..Diagnostics::default() },
         }
     }
 }

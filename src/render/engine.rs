@@ -3,11 +3,12 @@
 use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
-    path::Mapping,
+    path::{Faults, Mapping},
     rng::Rng,
     tempering::{Estimate, RoundReport},
 };
 
+use super::health::ChainReport;
 pub use super::status::Phase;
 
 /// What all blocks of a run share.
@@ -63,6 +64,19 @@ pub struct Development {
     pub normalisation: Option<Estimate>,
     /// What the person should know about the picture, one sentence each.
     pub warnings: Vec<String>,
+    /// What the run is judged by.
+    pub diagnostics: Diagnostics,
+}
+
+/// What a method knows about how well it works.
+#[derive(Default)]
+pub struct Diagnostics {
+    /// The round at work, as far as it has come, where there are rounds.
+    pub round: Option<RoundReport>,
+    /// Chains without a ladder.
+    pub chains: Option<ChainReport>,
+    /// Uniform points contradict all samples together.
+    pub contradiction: bool,
 }
 
 /// What a method counts.
@@ -73,7 +87,7 @@ pub struct Counts {
     /// Rays traced.
     pub rays: u64,
     /// Contributions settled.
-    pub non_finite: u64,
+    pub faults: Faults,
     /// Mean acceptance probability by tempered rung, coldest last.
     pub acceptance: Vec<f64>,
     /// Mean swap probability by pair of rungs, hottest first.

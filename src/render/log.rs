@@ -2,9 +2,10 @@
 //!
 //! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `round` what a
 //! round of replica exchange came to ([`RoundReport`]); `run_end` the same as a snapshot at the end, with the files
-//! written. Times are seconds, rates are probabilities. A line is on its way to
+//! written, the warnings, and whether the run can be trusted ([`Health`]). Times are seconds, rates are probabilities. A line is on its way to
 //! the disk once its event is over, so the log of a run that was killed is complete up to then.
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
@@ -14,6 +15,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::health::Health;
 use super::output::Picture;
 use super::status::{Observer, RunStart, Status, Summary};
 use crate::chain::TechniqueChanges;
@@ -123,6 +125,7 @@ impl Observer for Log {
             interrupted: summary.interrupted,
             outputs: summary.outputs.iter().map(|path| path.display().to_string()).collect(),
             warnings: &summary.warnings,
+            health: &summary.health,
         });
     }
 }
@@ -157,6 +160,7 @@ enum Event<'a> {
         interrupted: bool,
         outputs: Vec<String>,
         warnings: &'a [String],
+        health: &'a Health,
     },
 }
 
@@ -178,6 +182,9 @@ struct Now<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     technique_changes: Option<TechniqueChanges>,
     non_finite: u64,
+    /// Numbers of them by cause; absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    faults: Option<BTreeMap<&'static str, u64>>,
     normalisation: Option<f64>,
     normalisation_error: Option<f64>,
 }
@@ -194,6 +201,7 @@ impl<'a> From<&'a Status> for Now<'a> {
             swap: &status.swap,
             technique_changes: Some(status.technique_changes).filter(|changes| *changes != TechniqueChanges::default()),
             non_finite: status.non_finite,
+            faults: Some(status.faults.by_cause()).filter(|causes| !causes.is_empty()),
             normalisation: status.normalisation.map(|(value, _)| value),
             normalisation_error: status.normalisation.map(|(_, error)| error),
         }
@@ -296,6 +304,7 @@ mod tests {
         let picture = Picture::new(&film, Image::constant(1, 1, [0.0; 3]), vec![], vec![]);
         log.snapshot(&status(3), &picture);
         log.finished(&Summary {
+            health: Health::default(),
             status: status(4),
             outputs: vec!["a.exr".into()],
             interrupted: true,

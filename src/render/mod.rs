@@ -4,9 +4,11 @@ mod baseline;
 pub mod calibration;
 pub mod clock;
 pub mod engine;
+pub mod health;
 pub mod log;
 pub mod output;
 pub mod progress;
+pub mod replay;
 mod replica_exchange;
 mod run;
 pub mod settings;
@@ -15,6 +17,7 @@ pub mod status;
 mod tests;
 pub mod trial;
 
+pub use health::{Health, Verdict};
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, run};
 pub use settings::{

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::health::Health;
 use super::settings::Method;
 use super::status::{RunStart, Status};
 use crate::film::file::{FileError, check_writable};
@@ -136,6 +137,16 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     }
     let of_ladder = status.last_round.as_deref().map(ladder).unwrap_or_default();
     data.into_iter().map(|(name, value)| (name.to_owned(), value)).chain(of_ladder).collect()
+}
+
+/// What an image file says about whether it can be trusted: `health` (`good`, `doubtful` or `bad`) and, where it is not good,
+/// `health.findings`, a line for each.
+pub fn health_metadata(health: &Health) -> Vec<(String, Value)> {
+    let mut data: Vec<(String, Value)> = vec![("health".into(), health.verdict.name().into())];
+    if !health.findings.is_empty() {
+        data.push(("health.findings".into(), health.lines().join("\n").into()));
+    }
+    data
 }
 
 /// `ladder.NAME` for the last round of replica exchange.

@@ -263,17 +263,15 @@ fn choice(report: &RoundReport) -> String {
     [Some(format!("{} replicas", report.replicas)), uniform].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// What is said at the end: files, effort, warnings.
+/// What is said at the end: files, effort, warnings, and what is wrong with the run.
 pub fn ending(summary: &Summary) -> String {
     let status = &summary.status;
     let mut lines = Vec::new();
     if summary.interrupted {
         lines.push(format!("interrupted: the image holds what was done, {:.1} %", 100.0 * status.fraction()));
     }
-    if status.non_finite > 0 {
-        lines.push(format!("warning: {} contributions were not finite and count as black", status.non_finite));
-    }
     lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(summary.health.lines());
     let files: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
     lines.push(format!(
         "{} mutations in {} ({}/s{}); wrote {}",
@@ -515,13 +513,13 @@ round   K     Λ   min mean swap round trips     normalisation  mut./s uniform
     #[test]
     fn the_end_names_what_went_wrong() {
         let summary = Summary {
-            status: Status { non_finite: 3, target_mutations: Some(100), mutations: 23, ..Status::default() },
+            status: Status { target_mutations: Some(100), mutations: 23, ..Status::default() },
             interrupted: true,
             warnings: vec!["the image is black".into()],
             ..Summary::default()
         };
         let text = ending(&summary);
-        for part in ["interrupted", "23.0 %", "3 contributions were not finite", "warning: the image is black"] {
+        for part in ["interrupted", "23.0 %", "warning: the image is black"] {
             assert!(text.contains(part), "{text}");
         }
     }

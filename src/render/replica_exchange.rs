@@ -1,7 +1,7 @@
 //! `re` and `path`: replica exchange on the light paths of a scene, and its uniform rung alone.
 
 use super::{
-    engine::{Counts, Development, Engine, Phase, Stage, film_warnings},
+    engine::{Counts, Development, Diagnostics, Engine, Phase, Stage, film_warnings},
     settings::{Method, Settings},
 };
 use crate::{
@@ -64,7 +64,7 @@ impl Engine for ReplicaExchange {
         Counts {
             mutations: self.sampler.evaluations(),
             rays: self.sampler.rays(),
-            non_finite: self.sampler.non_finite(),
+            faults: self.sampler.faults().clone(),
             acceptance,
             swap,
             technique_changes: self.sampler.technique_changes(),
@@ -79,6 +79,11 @@ impl Engine for ReplicaExchange {
             image: developed.image,
             layers: developed.layers,
             normalisation: Some(developed.learnt.luminance),
+            diagnostics: Diagnostics {
+                round: Some(developed.round),
+                contradiction: !developed.learnt.warnings().is_empty(),
+                ..Diagnostics::default()
+            },
             warnings,
         }
     }

@@ -12,16 +12,17 @@ use super::{
     baseline::Mlt,
     calibration,
     clock::Clock,
-    engine::{Engine, Phase, Stage},
-    output::{Picture, metadata},
+    engine::{Diagnostics, Engine, Phase, Stage},
+    health::{self, Evidence, Health},
+    output::{Picture, health_metadata, metadata},
     replica_exchange::ReplicaExchange,
-    settings::{MappingChoice, Method, PacketChoice, Settings},
+    settings::{Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
     trial,
 };
 use crate::{
     film::Footprint,
-    path::{Mapping, Widths},
+    path::{Fault, Mapping, MappingKind, Widths, first_fault},
     rng::Rng,
     scene::Scene,
     tempering::RoundReport,
@@ -45,10 +46,14 @@ pub struct Outcome {
     pub picture: Picture,
     /// Where the run stood at its end.
     pub status: Status,
+    /// The mapping, in fact.
+    pub mapping: MappingKind,
     /// It was stopped before its budget was spent.
     pub interrupted: bool,
     /// What the person should know, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether the picture can be trusted.
+    pub health: Health,
 }
 
 /// Why a run could not take place.
@@ -75,13 +80,7 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
     let clock = Clock::start();
     let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
     let pool = thread_pool(threads, job.settings.pin)?;
-    let (mapping, mapping_trial) = match job.settings.mapping {
-        MappingChoice::Auto => {
-            let trial = pool.install(|| trial::try_mappings(job.scene, &job.settings));
-            (trial.chosen, Some(trial.why()))
-        }
-        MappingChoice::Fixed(mapping) => (mapping, None),
-    };
+    let (mapping, mapping_trial) = pool.install(|| trial::settle(job.scene, &job.settings));
     let widths = match job.settings.packet {
         PacketChoice::Auto => calibration::calibrate(job.scene, mapping),
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
@@ -114,7 +113,8 @@ struct Watch {
     last_round: Option<Arc<RoundReport>>,
 }
 
-fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
+/// Threads to work on.
+pub(super) fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
     let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("relt {i}"));
     if pin && let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
         builder = builder.start_handler(move |i| {
@@ -206,7 +206,8 @@ fn status(job: &Job, engine: &dyn Engine, watch: &Watch) -> Status {
         acceptance: counts.acceptance,
         swap: counts.swap,
         technique_changes: counts.technique_changes,
-        non_finite: counts.non_finite,
+        non_finite: counts.faults.total(),
+        faults: counts.faults,
         normalisation: None,
         last_round: watch.last_round.clone(),
     }
@@ -234,15 +235,44 @@ fn conclude(
         let (name, missed) = (start.mapping.name(), missed.join(" and "));
         warnings.push(format!("the image lacks {missed}: --mapping {name} makes no paths to that, all others do"));
     }
-    if status.non_finite > 0 {
-        warnings.push(format!(
-            "{} of {} paths had a contribution that was not finite; they count as dark",
-            status.non_finite, status.mutations
-        ));
-    }
-    let metadata = metadata(start, &status);
+    warnings.extend(non_finite(stage, &status));
+    let Diagnostics { round, chains, contradiction } = development.diagnostics;
+    let health = health::judge(&Evidence {
+        settings: &job.settings,
+        status: &status,
+        pixels: stage.pixels(),
+        round: telling(round.as_ref(), status.last_round.as_deref()),
+        chains: chains.as_ref(),
+        contradiction,
+    });
+    let mut metadata = metadata(start, &status);
+    metadata.extend(health_metadata(&health));
     let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
-    Outcome { picture, status, interrupted, warnings }
+    Outcome { picture, status, mapping: start.mapping, interrupted, warnings, health }
+}
+
+/// The one of the round at work and the last that ended that knows more.
+fn telling<'a>(now: Option<&'a RoundReport>, last: Option<&'a RoundReport>) -> Option<&'a RoundReport> {
+    let steps = |round: &RoundReport| round.rungs.last().map_or(0, |rung| rung.evaluations);
+    match (now, last) {
+        (Some(now), Some(last)) if !now.rungs.is_empty() && steps(now) < steps(last) => Some(last),
+        (now, _) => now,
+    }
+}
+
+/// What to say of contributions that were settled: how many, why, and where the first of them went wrong.
+fn non_finite(stage: &Stage, status: &Status) -> Option<String> {
+    let place = |fault: &Fault| first_fault(&stage.mapping.retrace(&fault.evaluation).events);
+    let place = status.faults.first().and_then(place);
+    let place = place.map_or(String::new(), |place| format!("; the first went wrong here: {place}"));
+    (status.non_finite > 0).then(|| {
+        format!(
+            "{} contributions of {} paths were not finite or negative ({}) and count as dark{place}",
+            status.non_finite,
+            status.mutations,
+            status.faults.in_words()
+        )
+    })
 }
 
 fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
@@ -275,7 +305,6 @@ mod tests {
     use crate::{
         embree::{Device, Width},
         film::Image,
-        path::MappingKind,
         render::engine::{Counts, Development},
     };
 
@@ -313,7 +342,13 @@ mod tests {
 
         fn develop(&self, _: &Stage) -> Development {
             let image = Image::constant(1, 1, [1.0; 3]);
-            Development { image, layers: Vec::new(), normalisation: None, warnings: Vec::new() }
+            Development {
+                image,
+                layers: Vec::new(),
+                normalisation: None,
+                warnings: Vec::new(),
+                diagnostics: Diagnostics::default(),
+            }
         }
 
         fn take_reports(&mut self) -> Vec<RoundReport> {

@@ -247,6 +247,40 @@ impl Settings {
         }
     }
 
+    /// The options of the command line that repeat the run but for threads, packets and files, with the mapping that was
+    /// settled on.
+    pub fn options(&self, mapping: MappingKind) -> Vec<String> {
+        let mut options = vec![format!("--method {}", self.method.name()), format!("--mapping {}", mapping.name())];
+        let mut add =
+            |name: &str, value: Option<String>| options.extend(value.map(|value| format!("--{name} {value}")));
+        let defaults = Settings::default();
+        let differs = |differs: bool, value: &str| differs.then(|| value.to_owned());
+        match (self.method, &self.ladder) {
+            (Method::ReplicaExchange, LadderChoice::Replicas(k)) => add("replicas", Some(k.to_string())),
+            (Method::ReplicaExchange, LadderChoice::Betas(betas)) => {
+                let betas: Vec<String> = betas.iter().map(f64::to_string).collect();
+                add("betas", Some(betas.join(",")));
+            }
+            _ => {}
+        }
+        if self.method == Method::ReplicaExchange {
+            add("combine", differs(self.combine != defaults.combine, self.combine.name()));
+            add("uniform-share", self.uniform_share.map(|share| share.to_string()));
+            add("error", differs(self.measure != defaults.measure, self.measure.name()));
+        }
+        if self.method == Method::Mlt {
+            let MltSettings { large_steps, normalisation, kelemen_weights } = self.mlt;
+            add("large-steps", differs(large_steps != defaults.mlt.large_steps, &large_steps.to_string()));
+            add("normalisation", differs(normalisation != defaults.mlt.normalisation, normalisation.name()));
+            add("kelemen-weights", differs(kelemen_weights, ""));
+        }
+        add("technique-changes", differs(self.technique_changes, "on"));
+        add("mpp", self.mutations_per_pixel.map(|mpp| mpp.to_string()));
+        add("time", self.time.map(|time| humantime::format_duration(time).to_string().replace(' ', "")));
+        add("seed", Some(self.seed.to_string()));
+        options.iter().map(|option| option.trim_end().to_owned()).collect()
+    }
+
     /// Every contradiction, one sentence each in the words of the command line; none if the settings make sense.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();

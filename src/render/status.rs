@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::health::Health;
 use super::output::Picture;
 use super::settings::Settings;
 use crate::chain::TechniqueChanges;
-use crate::path::MappingKind;
+use crate::path::{Faults, MappingKind};
 use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
@@ -75,8 +76,10 @@ pub struct Status {
     pub swap: Vec<f64>,
     /// What became of changes of technique; of the round, on a ladder.
     pub technique_changes: TechniqueChanges,
-    /// Contributions that were not finite and were taken as zero.
+    /// Contributions that could not be used and were taken as zero.
     pub non_finite: u64,
+    /// Why, and which was the first.
+    pub faults: Faults,
     /// The estimate of c = ∫ g and its standard error, once there is one.
     pub normalisation: Option<(f64, f64)>,
     /// The last round that ended; absent before that, and for methods without rounds.
@@ -156,6 +159,8 @@ pub struct Summary {
     pub interrupted: bool,
     /// What the person should know about the image, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether it can be trusted.
+    pub health: Health,
 }
 
 /// Somebody who follows a run. The render loop calls these from one thread at a time; each returns soon.

@@ -26,10 +26,10 @@ fn bits(engine: &dyn Engine, stage: &Stage) -> Vec<u64> {
         Plane::Rgb(image) => image.pixels.into_flattened(),
         Plane::Gray(values) => values,
     }));
-    let Counts { mutations, rays, non_finite, acceptance, swap, .. } = engine.counts();
+    let Counts { mutations, rays, faults, acceptance, swap, .. } = engine.counts();
     let estimate = development.normalisation.expect("every method has one");
     let numbers = [&acceptance[..], &swap[..], &[estimate.value, estimate.standard_error]].concat();
-    let words = planes.concat().into_iter().map(|v| u64::from(v.to_bits())).chain([mutations, rays, non_finite]);
+    let words = planes.concat().into_iter().map(|v| u64::from(v.to_bits())).chain([mutations, rays, faults.total()]);
     words.chain(numbers.into_iter().map(f64::to_bits)).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::settings::{Method, Settings};
+use super::settings::{MappingChoice, Method, Settings};
 use crate::{
     chain::Evaluator,
     embree::Width,
@@ -86,6 +86,17 @@ pub fn candidates(features: &Features, method: Method) -> Vec<Candidate> {
         .filter(|kind| kind.misses(features).is_empty())
         .map(|kind| Candidate { kind, told_by: told_by(kind) })
         .collect()
+}
+
+/// The mapping that settings ask for, and where that is left to a trial, why it is that one.
+pub fn settle(scene: &Scene, settings: &Settings) -> (MappingKind, Option<String>) {
+    match settings.mapping {
+        MappingChoice::Auto => {
+            let trial = try_mappings(scene, settings);
+            (trial.chosen, Some(trial.why()))
+        }
+        MappingChoice::Fixed(mapping) => (mapping, None),
+    }
 }
 
 /// Tries all mappings that could serve the scene on some thousand uniform points each, as far as the budget has room for

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     chain::{Evaluator, Importance, Start, Target, Walkers, replay},
-    path::Whole,
+    path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
 };
@@ -356,13 +356,13 @@ impl<W: Default + Send> Block<W> {
     }
 
     /// Rays traced and contributions settled since this was last asked for.
-    pub fn take_rays_and_faults(&mut self) -> [u64; 2] {
-        let mut sums = [0; 2];
+    pub fn take_rays_and_faults(&mut self) -> (u64, Faults) {
+        let (mut rays, mut faults) = (0, Faults::default());
         for part in &mut self.parts {
-            sums[0] += std::mem::take(&mut part.evaluator.out.rays);
-            sums[1] += std::mem::take(&mut part.evaluator.out.non_finite);
+            rays += std::mem::take(&mut part.evaluator.out.rays);
+            faults.merge(&std::mem::take(&mut part.evaluator.out.faults));
         }
-        sums
+        (rays, faults)
     }
 }
 
@@ -436,6 +436,32 @@ impl<W: Default> Part<W> {
             let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
             let alpha = evaluator.settle_change(walkers, at, beta_of(at), &mut record);
             tally.counts[k].changes.count(alpha);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    /// Replicas and offers of all ladders draw words of their own, however a ladder is cut into parts and also when there
+    /// come to be more offers. (Two that share them look right each by itself; they are no longer independent.)
+    #[test]
+    fn no_two_lanes_draw_the_same_words() {
+        let rng = Rng::new(1);
+        for (rungs, lanes_a_part) in [(2, 512), (5, 512), (5, 8), (40, 16)] {
+            let blocks = (0..3).map(|number| Block::<()>::new(rng, (number, 3), rungs, 1, lanes_a_part, 1, [1, 1]));
+            let mut blocks: Vec<Block<()>> = blocks.collect();
+            for offers in [1, 4] {
+                blocks.iter_mut().for_each(|block| block.set_offers(rng, offers));
+                let parts = blocks.iter().flat_map(|block| &block.parts);
+                let counters: Vec<Counter> = parts.flat_map(|part| part.evaluator.counters.clone()).collect();
+                let words: HashSet<[u32; 4]> = counters.iter().map(|counter| rng.words(*counter, 0)).collect();
+                assert_eq!(counters.len(), 3 * 3 * (rungs - 1 + offers));
+                assert_eq!(words.len(), counters.len(), "{rungs} rungs, {offers} offers");
+            }
         }
     }
 }

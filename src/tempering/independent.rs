@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::{Canvas, Round, Tally};
 use crate::{
     chain::{Evaluator, Importance, Start, Target},
+    path::Faults,
     rng::{Counter, Purpose, Rng},
     sample::{Move, PixelOrder, Points},
 };
@@ -133,9 +134,9 @@ impl<W: Default> Independent<W> {
     }
 
     /// Rays traced and contributions settled since this was last asked for.
-    pub fn take_rays_and_faults(&mut self) -> [u64; 2] {
+    pub fn take_rays_and_faults(&mut self) -> (u64, Faults) {
         let out = &mut self.evaluator.out;
-        [std::mem::take(&mut out.rays), std::mem::take(&mut out.non_finite)]
+        (std::mem::take(&mut out.rays), std::mem::take(&mut out.faults))
     }
 }
 

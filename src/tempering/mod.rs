@@ -6,6 +6,7 @@
 //! inverse temperatures with its neighbour. The lowest rung, β = 0, is the uniform distribution: it has no chain but
 //! fresh points, some every sweep, each of which is offered to the rung above.
 
+mod agreement;
 mod block;
 mod choices;
 mod density;
@@ -28,6 +29,7 @@ mod trips;
 mod tuning;
 mod weights;
 
+pub use agreement::{effective_samples, split_r_hat};
 pub use block::Block;
 pub use choices::{Choices, Combine, LadderChoice};
 pub use density::DensityOfStates;

@@ -76,6 +76,9 @@ pub struct RoundReport {
     /// ladders agree, above 1.01 where they have not forgotten their starts.
     #[serde(deserialize_with = "or_nan")]
     pub split_r_hat: f64,
+    /// Halves of blocks of ladders that it compares; 0 in logs that do not tell.
+    #[serde(default)]
+    pub r_hat_halves: usize,
     /// Contributions so far that were not finite and were taken as zero.
     pub non_finite: u64,
     /// Rays traced so far, both kinds.

@@ -5,7 +5,7 @@ use rayon::{ThreadPoolBuilder, prelude::*};
 use relt::{
     chain::{LargeSteps, Measure, Target},
     film::{Filter, Footprint, Image, Plane},
-    path::{Contribution, Contributions, FilmSplat, Outcome},
+    path::{Causes, Contribution, Contributions, FilmSplat, Outcome},
     rng::{Rng, unit_f32},
     sample::Proposals,
     scene::Rgb,
@@ -74,9 +74,9 @@ impl Target for Scattered {
             }
             let red = if t < 0.5 { Scattered::own(x, y) / 0.5 } else { 0.0 };
             let rgb = Rgb::new(red, 0.0, 0.0);
-            let (whole, faults) = Contribution::settle_whole([x, y], rgb, &mut out.elsewhere, lane);
+            let (whole, causes) = Contribution::settle_whole([x, y], rgb, &mut out.elsewhere, lane);
             out.lanes[lane] = whole;
-            out.non_finite += faults;
+            out.faults.count(causes);
         }
     }
 
@@ -135,7 +135,7 @@ impl Target for Choosing {
             let own = if chosen == 0 { rgb } else { Rgb::ZERO };
             let (whole, faults) = Contribution::settle_whole(film, own, &mut out.elsewhere, lane);
             out.lanes[lane] = Contribution { chance: Choosing::CHANCES[chosen], ..whole };
-            out.non_finite += faults;
+            out.faults.count(faults);
         }
     }
 
@@ -155,6 +155,7 @@ impl Target for Choosing {
             let [_, roulette, ..] = proposals.block(2, lane).map(unit_f32);
             out.outcomes.clear(lane);
             out.lanes[lane] = Contribution { film, ..Contribution::NONE };
+            let mut causes = Causes::NONE;
             for (i, splat) in lit.into_iter().enumerate() {
                 let survival = if i == 0 { Choosing::SURVIVAL } else { 1.0 };
                 if i == 0 && roulette >= survival {
@@ -163,9 +164,10 @@ impl Target for Choosing {
                 let splat = FilmSplat { rgb: splat.rgb / survival, ..splat };
                 let chance = Choosing::CHANCES[i] / survival;
                 let mut outcome = Outcome { splat, own: i == 0, chance, ..Outcome::default() };
-                out.non_finite += outcome.settle();
+                outcome.settle(&mut causes);
                 out.outcomes.push(lane, outcome);
             }
+            out.faults.count(causes);
         }
     }
 }

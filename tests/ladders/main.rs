@@ -4,6 +4,7 @@ mod baseline;
 mod bits;
 mod elsewhere;
 mod exact;
+mod health;
 mod images;
 mod kernels;
 mod normalisers;

@@ -8,7 +8,7 @@ use relt::render::{Combine, LadderChoice, Method, Outcome, Settings};
 use crate::support::{render, scene_of, settings};
 
 /// 16 × 16 pixels of a closed room with a box in it.
-fn room(more: &str) -> String {
+pub fn room(more: &str) -> String {
     format!(
         "<integrator type='path'><integer name='max_depth' value='6'/></integrator>
          <sensor type='perspective'><float name='fov' value='60'/>
@@ -22,7 +22,7 @@ fn room(more: &str) -> String {
 }
 
 /// A lamp at the ceiling.
-fn lamp(radiance: &str) -> String {
+pub fn lamp(radiance: &str) -> String {
     format!(
         "<shape type='rectangle'>
            <transform name='to_world'><rotate x='1' angle='90'/><scale value='0.5'/><translate y='1.9'/></transform>
@@ -31,7 +31,7 @@ fn lamp(radiance: &str) -> String {
 }
 
 /// A lamp in a box of its own that is closed on all sides.
-fn hidden_lamp() -> String {
+pub fn hidden_lamp() -> String {
     "<shape type='cube'><transform name='to_world'><scale value='0.2'/><translate x='0.8'/></transform>
        <bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>
      <shape type='sphere'><point name='center' value='0.8, 0, 0'/><float name='radius' value='0.1'/>
@@ -76,7 +76,7 @@ fn methods(mutations_per_pixel: f64) -> Vec<Settings> {
 }
 
 /// Every number of a picture, its layers and what is said of it is finite; pixels are not negative.
-fn assert_finite(outcome: &Outcome, what: &str) {
+pub fn assert_finite(outcome: &Outcome, what: &str) {
     let fine = |v: &f32| v.is_finite() && *v >= 0.0;
     assert!(outcome.picture.image.pixels.as_flattened().iter().all(fine), "{what}: the image");
     for (name, plane) in &outcome.picture.layers {

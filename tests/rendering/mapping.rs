@@ -2,7 +2,10 @@
 
 use relt::chain::Evaluator;
 use relt::embree::Width;
-use relt::path::{Contribution, Elsewhere, Mapping, MappingKind, Workspace, bidirectional, scalar};
+use relt::path::{
+    Cause, Causes, Contribution, Elsewhere, Evaluation, Event, Faults, Mapping, MappingKind, Retraced, Workspace,
+    bidirectional, scalar,
+};
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
 use relt::scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
@@ -42,11 +45,30 @@ fn bits(c: &Contribution) -> ([u32; 2], [u32; 3], u64) {
     (c.film.map(f32::to_bits), c.rgb.to_array().map(f32::to_bits), c.ln_g.to_bits())
 }
 
+/// The sum that a retraced path ends its camera's subpath with; black where it found nothing.
+fn told_sum(events: &[Event]) -> [f64; 3] {
+    let own = |event: &&Event| event.quantities.iter().all(|q| q.name != "film");
+    let mut sums = events.iter().filter(own).flat_map(|event| &event.quantities).filter(|q| q.name == "sum so far");
+    sums.next_back().map_or([0.0; 3], |sum| sum.values[..].try_into().expect("three channels"))
+}
+
+/// What that should be.
+fn told_sum_of(got: &Contribution, retraced: &Retraced) -> [f64; 3] {
+    match retraced.causes.is_none() {
+        true => got.rgb.to_array().map(f64::from),
+        false => told_sum(&retraced.events), // replaced by black
+    }
+}
+
 /// What the specification says of a lane.
-fn specified<P: Profile>(mapping: &Mapping, proposals: &mut Proposals, lane: usize) -> (Contribution, Elsewhere, u64) {
+fn specified<P: Profile>(
+    mapping: &Mapping,
+    proposals: &mut Proposals,
+    lane: usize,
+) -> (Contribution, Elsewhere, Causes) {
     if mapping.kind() == MappingKind::Unidirectional {
-        let (contribution, fault) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
-        return (contribution, Elsewhere::new(1), u64::from(fault));
+        let (contribution, causes) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
+        return (contribution, Elsewhere::new(1), causes);
     }
     bidirectional::scalar::evaluate::<P>(mapping, proposals, lane)
 }
@@ -64,7 +86,7 @@ fn compare<P: Profile>(
     let mut evaluator = Evaluator::<Workspace>::new(rng, counters(0));
     let mut current = Points::new(LANES);
     let mut all = Vec::new();
-    let mut faults = 0;
+    let mut faults = Faults::default();
     for step in 0..STEPS {
         let moves = moves(step);
         evaluator.counters = counters(step);
@@ -93,16 +115,23 @@ fn compare<P: Profile>(
         for lane in live.into_iter().map(|lane| lane as usize) {
             let replay =
                 format!("{name}, {} mapping, {kernel:?} kernel, width {width}, step {step}, lane {lane}", kind.name());
-            let (expected, elsewhere, fault) = specified::<P>(&mapping, &mut proposals, lane);
+            let (expected, elsewhere, causes) = specified::<P>(&mapping, &mut proposals, lane);
             let got = evaluator.out.lanes[lane];
             assert_eq!(bits(&got), bits(&expected), "{replay}: {got:?} for {expected:?}");
             let got_elsewhere = evaluator.out.elsewhere.of(lane);
             assert_eq!(got_elsewhere, elsewhere.of(0), "{replay}: elsewhere");
-            faults += fault;
+            faults.count(causes);
             let used = proposals.points.used(lane);
             assert_eq!(evaluator.points.used(lane), used, "{replay}: blocks");
             for block in (0..used[0]).chain(LIGHT_STREAM..LIGHT_STREAM + used[1]) {
                 assert_eq!(evaluator.points.block(block, lane), proposals.block(block, lane), "{replay}: {block}");
+            }
+            if step % 8 == 0 {
+                let evaluation = Evaluation::of(&proposals, lane).expect("the lane does not rest");
+                let retraced = mapping.retrace(&evaluation);
+                assert_eq!(bits(&retraced.contribution), bits(&got), "{replay}: retraced");
+                assert_eq!(retraced.elsewhere.of(0), got_elsewhere, "{replay}: retraced elsewhere");
+                assert_eq!(told_sum(&retraced.events), told_sum_of(&got, &retraced), "{replay}: {:?}", retraced.events);
             }
             all.push(got);
             if !got.is_dark() {
@@ -113,7 +142,8 @@ fn compare<P: Profile>(
             current.copy(lane, &points, lane);
         }
     }
-    assert_eq!(evaluator.out.non_finite, faults, "{name}: faults");
+    let by_cause = |faults: &Faults| Cause::ALL.map(|cause| faults.of(cause));
+    assert_eq!(by_cause(&evaluator.out.faults), by_cause(&faults), "{name}: faults");
     all
 }
 

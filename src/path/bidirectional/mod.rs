@@ -25,7 +25,7 @@ use subpath::{Arrival, CameraEnd, LightVertex, PLAIN, Particle, Site};
 use weights::Step;
 
 use super::{
-    Contribution, Contributions, FilmSplat, Mapping, Outcome, Workspace,
+    Causes, Contribution, Contributions, FilmSplat, Mapping, Outcome, Workspace,
     tracing::{Kind, Tracing},
     vertex::{Carried, Connection, Decisions},
 };
@@ -536,13 +536,15 @@ fn scatter_camera<P: Profile, const HOW: u8>(
 fn settle<const HOW: u8>(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
-            let (contribution, faults) =
+            let (contribution, causes) =
                 Contribution::settle_whole(w.film[lane], w.radiance[lane], &mut out.elsewhere, lane);
             out.lanes[lane] = contribution;
             if HOW == ONE && w.chosen[lane].scale > 0.0 {
                 out.lanes[lane].chance = 1.0 / w.chosen[lane].scale;
             }
-            out.non_finite += faults;
+            if !causes.is_none() {
+                out.faults.note(causes, proposals, lane);
+            }
         }
     }
 }
@@ -557,8 +559,10 @@ fn settle_outcomes(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
             out.lanes[lane] = Contribution { film: w.film[lane], ..Contribution::NONE };
-            for outcome in out.outcomes.of_mut(lane) {
-                out.non_finite += outcome.settle();
+            let mut causes = Causes::NONE;
+            out.outcomes.of_mut(lane).iter_mut().for_each(|outcome| outcome.settle(&mut causes));
+            if !causes.is_none() {
+                out.faults.note_open(causes, proposals, lane);
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::{Learnt, Sampler};
 use crate::{
     film::{Footprint, Heuristic, Image, Plane, Splats},
-    tempering::{Combine, Histogram, PointLayer, Tally},
+    tempering::{Combine, Histogram, PointLayer, RoundReport, Tally},
 };
 
 /// What there is to show at some moment.
@@ -14,6 +14,8 @@ pub struct Development {
     pub layers: Vec<(String, Plane)>,
     /// What the statistics say at this moment.
     pub learnt: Learnt,
+    /// The round at work, as far as it has come.
+    pub round: RoundReport,
 }
 
 impl<W: Default + Send> Sampler<W> {
@@ -45,7 +47,7 @@ impl<W: Default + Send> Sampler<W> {
             Combine::Median => Heuristic::Median.combine(&planes.uniform(), &planes.target()),
             Combine::MedianPrinted => Heuristic::MedianAsPrinted.combine(&planes.uniform(), &planes.target()),
         };
-        Development { image, layers: planes.layers(), learnt }
+        Development { image, layers: planes.layers(), round: self.report(&learnt), learnt }
     }
 }
 

@@ -30,6 +30,7 @@ use super::{
 use crate::{
     chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target, TechniqueChanges},
     film::{Accumulator, Footprint},
+    path::Faults,
     rng::Rng,
 };
 
@@ -89,7 +90,7 @@ pub struct Sampler<W> {
     sweeps: u64,
     evaluations: u64,
     wanted: Option<u64>,
-    non_finite: u64,
+    faults: Faults,
     rays: u64,
     reports: Vec<RoundReport>,
 }
@@ -252,7 +253,7 @@ impl<W: Default + Send> Sampler<W> {
             evaluations: 0,
             wanted: evaluations,
             rays: 0,
-            non_finite: 0,
+            faults: Faults::default(),
         }
     }
 
@@ -346,11 +347,11 @@ impl<W: Default + Send> Sampler<W> {
         let uniform_rays = &mut self.uniform_rays[usize::from(purpose == Use::OpenImage)];
         uniform_rays[0] += drawn;
         for portion in &mut self.portions {
-            let [uniform, faults] = portion.uniform.take_rays_and_faults();
+            let (uniform, faults) = portion.uniform.take_rays_and_faults();
             uniform_rays[1] += uniform;
-            let [ladders, more] = portion.ladders.as_mut().map_or([0; 2], Block::take_rays_and_faults);
+            let (ladders, more) = portion.ladders.as_mut().map(Block::take_rays_and_faults).unwrap_or_default();
             self.rays += uniform + ladders;
-            self.non_finite += faults + more;
+            [faults, more].iter().for_each(|faults| self.faults.merge(faults));
             self.ladder_rays += ladders;
         }
         if purpose != Use::Starts {
@@ -384,9 +385,9 @@ impl<W: Default + Send> Sampler<W> {
         self.rays
     }
 
-    /// Contributions so far that were not finite and were taken as zero.
-    pub fn non_finite(&self) -> u64 {
-        self.non_finite
+    /// Contributions so far that could not be used and were taken as zero.
+    pub fn faults(&self) -> &Faults {
+        &self.faults
     }
 
     /// The film.
@@ -399,7 +400,8 @@ impl<W: Default + Send> Sampler<W> {
         &self.round.ladder
     }
 
-    /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round.
+    /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round; empty where not all of them are
+    /// known, as at its start and once chains are given up.
     pub fn acceptances(&self) -> (Vec<f64>, Vec<f64>) {
         let counts = self.counts_by_rung();
         let steps = counts[1..].iter().map(|counts| {
@@ -407,7 +409,9 @@ impl<W: Default + Send> Sampler<W> {
             counts.steps.iter().for_each(|count| all += *count);
             all.acceptance()
         });
-        (steps.collect(), counts[1..].iter().map(|counts| counts.swaps.acceptance()).collect())
+        let swaps = counts[1..].iter().map(|counts| counts.swaps.acceptance());
+        let known = |rates: Vec<f64>| if rates.iter().any(|rate| rate.is_nan()) { Vec::new() } else { rates };
+        (known(steps.collect()), known(swaps.collect()))
     }
 
     /// What became of changes of technique, in this round.

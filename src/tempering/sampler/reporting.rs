@@ -3,14 +3,14 @@
 use super::{Learnt, Sampler};
 use crate::tempering::{
     Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport,
-    probes::TRIALS, steps, trips::Dwell,
+    agreement::split_r_hat, probes::TRIALS, steps, trips::Dwell,
 };
 
 /// β at which the local barrier is told.
 const BARRIER_POINTS: usize = 33;
 
 impl<W: Default + Send> Sampler<W> {
-    /// The report of the round that ends.
+    /// The report of the round at work, as far as it has come.
     pub(super) fn report(&self, learnt: &Learnt) -> RoundReport {
         let ladder = &self.round.ladder;
         let betas = ladder.betas();
@@ -22,6 +22,7 @@ impl<W: Default + Send> Sampler<W> {
         let chains = ladders > 0;
         let waits: f64 = rejection.iter().map(|r| r / (1.0 - r)).sum();
         let trips = |f: fn(&crate::tempering::trips::Trips) -> u64| blocks().map(|block| f(block.trips())).sum::<u64>();
+        let (split_r_hat, r_hat_halves) = self.split_r_hat();
         let index = blocks().find_map(|block| block.index());
         let grid = (0..BARRIER_POINTS).map(|i| i as f64 / (BARRIER_POINTS - 1) as f64);
         RoundReport {
@@ -56,8 +57,9 @@ impl<W: Default + Send> Sampler<W> {
             uniform_share: self.uniform_share(),
             offers: if chains { self.offers as u64 } else { 0 },
             chain_ratio: self.round.weights.ratio(),
-            split_r_hat: self.split_r_hat(),
-            non_finite: self.non_finite,
+            split_r_hat,
+            r_hat_halves,
+            non_finite: self.faults.total(),
             rays: self.rays,
             rungs: if chains { self.rung_reports(learnt, &counts) } else { Vec::new() },
             index_process: index.map_or_else(Vec::new, |index| index.rungs.clone()),
@@ -150,10 +152,8 @@ impl<W: Default + Send> Sampler<W> {
         sum
     }
 
-    /// Split R̂ of ln g on the target: √(1 + B/W), B the variance between the means of the blocks' halves beyond what
-    /// their own variance explains were states independent, W the variance within. (Gelman et al. 2013, section 11.4,
-    /// with blocks of ladders in the place of chains.)
-    fn split_r_hat(&self) -> f64 {
+    /// Split R̂ of ln g on the target, with blocks of ladders in the place of chains, and the number of their halves.
+    fn split_r_hat(&self) -> (f64, usize) {
         let top = self.round.ladder.chains();
         let mut means = Vec::new();
         let mut within = crate::tempering::Histogram::default();
@@ -166,13 +166,8 @@ impl<W: Default + Send> Sampler<W> {
             block.add_histograms(&mut histograms);
             within.merge(&histograms[top]);
         }
-        let Some((_, sd)) = within.mean_and_sd().filter(|(_, sd)| *sd > 0.0 && means.len() > 2) else {
-            return f64::NAN;
-        };
-        let n = means.len() as f64;
-        let mean = means.iter().sum::<f64>() / n;
-        let between = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (1.0 + between / (sd * sd)).sqrt()
+        let sd = within.mean_and_sd().map_or(f64::NAN, |(_, sd)| sd);
+        (split_r_hat(&means, sd), means.len())
     }
 }
 

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use super::{Learnt, Luminance, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
     chain::{Importance, Start, Target, resample},
-    scene::Rgb,
     tempering::{
         Block, Estimate, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Sum, Weights,
         placement::rungs,
@@ -98,10 +97,8 @@ impl<W: Default + Send> Sampler<W> {
             let more = self.screen.film.layer(elsewhere);
             sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
         }
-        let luminance = |[r, g, b, points]: [f64; 4]| {
-            let rgb = Rgb::new(r as f32, g as f32, b as f32);
-            [f64::from(crate::path::luminance(rgb)), points]
-        };
+        // sums may be beyond f32 where their terms are not
+        let luminance = |[r, g, b, points]: [f64; 4]| [0.299 * r + 0.587 * g + 0.114 * b, points];
         let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
         let importance = Arc::new(Importance::new(self.screen.size, &found));
         for portion in &mut self.portions {
@@ -500,6 +497,7 @@ mod tests {
         path::{Contribution, Contributions, FilmSplat},
         rng::{Rng as Random, unit_f32},
         sample::Proposals,
+        scene::Rgb,
         tempering::{Choices, Setup},
     };
 
