@@ -5,8 +5,10 @@
 //! step and the block of four primary dimensions, so a number can be drawn anywhere, in any order and again: that
 //! is what makes replay, lazy dimensions and the same image for any number of threads possible at once.
 
+use serde::{Deserialize, Serialize};
+
 /// What random numbers are for; part of the counter, so that streams never meet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Purpose {
     /// Primary samples and their mutations; one block of four dimensions a counter.
@@ -34,7 +36,7 @@ pub enum Purpose {
 }
 
 /// Identifies one call for four random words.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counter {
     /// The ladder (for chains without ladder, the chain; for stratified points, the pixel).
     pub ladder: u32,

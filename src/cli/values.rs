@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::embree::Width;
 use crate::path::MappingKind;
 use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, Normalisation, PacketChoice};
 
@@ -72,20 +71,7 @@ pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
 }
 
 pub(super) fn packet() -> impl TypedValueParser<Value = PacketChoice> {
-    static ALL: [PacketChoice; 5] = [
-        PacketChoice::Auto,
-        PacketChoice::Fixed(Width::W1),
-        PacketChoice::Fixed(Width::W4),
-        PacketChoice::Fixed(Width::W8),
-        PacketChoice::Fixed(Width::W16),
-    ];
-    one_of(&ALL, |packet| match packet {
-        PacketChoice::Auto => "auto",
-        PacketChoice::Fixed(Width::W1) => "1",
-        PacketChoice::Fixed(Width::W4) => "4",
-        PacketChoice::Fixed(Width::W8) => "8",
-        PacketChoice::Fixed(Width::W16) => "16",
-    })
+    one_of(&PacketChoice::ALL, |packet| packet.name())
 }
 
 /// Exactly the names of `all`, which help and messages list.

@@ -1,5 +1,7 @@
 //! What a point contributes to the image, and the scalar that chains follow.
 
+use serde::{Deserialize, Serialize};
+
 use crate::scene::Rgb;
 
 /// Luminance with the paper's weights (Rec. 601): 0.299 R + 0.587 G + 0.114 B. Non-negative colours have
@@ -10,7 +12,7 @@ pub fn luminance(rgb: Rgb) -> f32 {
 }
 
 /// The contribution of one point of the cube, but for what it gives to the film elsewhere ([`Elsewhere`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contribution {
     /// Position on the film, as fractions of its width and height.
     pub film: [f32; 2],
@@ -92,7 +94,7 @@ fn settled(rgb: Rgb) -> (Rgb, bool) {
 }
 
 /// What a point adds to one place of the film.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FilmSplat {
     /// Position on the film, as fractions of its width and height.
     pub film: [f32; 2],
@@ -112,7 +114,7 @@ impl FilmSplat {
 /// subpaths that the camera sees. Lists by lane; lanes of mappings that have no such thing cost nothing.
 ///
 /// Memory is as large as the longest list asks for and then stays, so a batch that is warm allocates nothing.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Elsewhere {
     /// Splats that a lane has room for.
     room: usize,
@@ -123,6 +125,12 @@ pub struct Elsewhere {
 }
 
 impl Elsewhere {
+    /// Whether it is for so many lanes and its lists lie where they should.
+    pub fn fits(&self, lanes: usize) -> bool {
+        let within = self.counts.iter().all(|count| usize::from(*count) <= self.room);
+        self.counts.len() == lanes && within && self.room.checked_mul(lanes) == Some(self.splats.len())
+    }
+
     /// Nothing, for `lanes` lanes.
     pub fn new(lanes: usize) -> Elsewhere {
         Elsewhere { room: 0, counts: vec![0; lanes], splats: Vec::new() }

@@ -1,6 +1,6 @@
 //! The mappings and the choice among them.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Contributions, Layout, RecordedRays, Widths, bidirectional,
@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// How points of the cube become light paths.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MappingKind {
     /// Camera paths with next-event estimation.

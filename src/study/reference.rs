@@ -12,8 +12,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::checksum::Checksum;
 use super::metrics::{FLOOR, Reference};
+use crate::checksum::Checksum;
 use crate::film::Image;
 use crate::film::file::{FileError, write_whole};
 use crate::path::MappingKind;
