@@ -50,6 +50,11 @@ impl<W: io::Write> Summed<W> {
         let sum = self.sum.finish();
         self.to.write_all(&sum.to_le_bytes())
     }
+
+    /// The checksum of everything that came by.
+    pub fn finish(self) -> u32 {
+        self.sum.finish()
+    }
 }
 
 impl<W: io::Write> io::Write for Summed<W> {

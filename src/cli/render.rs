@@ -1,23 +1,24 @@
 //! `relt render`: from a scene file to an image.
 
 use std::path::{Path, PathBuf, absolute};
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 
 use super::failure::Failure;
-use super::scene::SceneArguments;
+use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
+use crate::film::file::{FileError, check_writable};
 use crate::path::MappingKind;
 use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer, Output,
-    PacketChoice, Picture, RunStart, Settings, Status, Summary,
+    self, Checkpoint, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer, Output,
+    PacketChoice, Picture, Resumed, RunStart, Settings, Status, Summary, checkpoint,
 };
 use crate::tempering::RoundReport;
 
@@ -37,9 +38,23 @@ pub(super) struct Render {
     #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
     snapshot: Option<Duration>,
 
-    /// Writes a log, one JSON object a line
+    /// Writes a log, one JSON object a line; with --resume it goes on in the file that is there
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     log: Option<PathBuf>,
+
+    /// Writes all that it takes to go on later, at this interval, such as 5m, on SIGUSR1, and at the end, early or not
+    #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
+    checkpoint: Option<Duration>,
+
+    /// Where that goes; alone, it is written on SIGUSR1 and at the end only [default: the image's name with .checkpoint, or
+    /// the file that --resume names]
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    checkpoint_file: Option<PathBuf>,
+
+    /// Goes on from a checkpoint, with its settings; budgets are those of the whole run. auto: from the file that
+    /// --checkpoint writes, or from the beginning where there is none yet
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    resume: Option<PathBuf>,
 
     /// Shows nothing but errors
     #[arg(short, long, help_heading = "Files")]
@@ -49,9 +64,9 @@ pub(super) struct Render {
     #[arg(short, long, help_heading = "Files")]
     verbose: bool,
 
-    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
-    #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
-    method: Method,
+    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange [default: re]
+    #[arg(long, value_parser = values::method(), help_heading = "Method")]
+    method: Option<Method>,
 
     /// Replicas on a ladder for --method re, 1 to 1024, the uniform one included, placed at equal rejection of swaps;
     /// auto: as many as pay, none but the uniform one where path tracing is best [default: auto]
@@ -60,9 +75,9 @@ pub(super) struct Render {
 
     /// From random numbers to light paths; unidirectional: camera paths; light: light subpaths seen by the camera;
     /// two-way: both; bidirectional: both, and every vertex of one joined to every vertex of the other; multiplexed: one of
-    /// those ways for each mutation; auto: a short trial on the scene decides
-    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = values::mapping(), help_heading = "Method")]
-    mapping: MappingChoice,
+    /// those ways for each mutation; auto: a short trial on the scene decides [default: auto]
+    #[arg(long, value_name = "HOW", value_parser = values::mapping(), help_heading = "Method")]
+    mapping: Option<MappingChoice>,
 
     /// Lets chains on --mapping multiplexed change the technique of a path and keep the path [default: off]
     #[arg(long, value_name = "WHETHER", value_parser = values::switch(), help_heading = "Method")]
@@ -112,9 +127,9 @@ pub(super) struct Render {
     #[arg(long, value_parser = values::duration, allow_hyphen_values = true, help_heading = "Budget")]
     time: Option<Duration>,
 
-    /// Seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Budget")]
-    seed: u64,
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
+    seed: Option<u64>,
 
     /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
@@ -131,29 +146,68 @@ pub(super) struct Render {
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
-    let settings = arguments.settings()?;
-    let output = arguments.output()?;
-    let opened = arguments.scene.open(arguments.threads, arguments.quiet)?;
-    let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
+    let keep = arguments.keep();
+    let (resumed, told) = arguments.resumed(keep.as_deref())?;
+    let header = resumed.as_ref().map(|resumed| &resumed.header);
+    let settings = arguments.settings(header.map(|header| &header.start.settings))?;
+    let output = arguments.output(keep.as_deref(), resumed.is_some())?;
+    let (settings, opened, scene_digest) = {
+        let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
+        let kept = keep.is_some() || resumed.is_some();
+        let digest = if kept { checkpoint::scene_digest(&description) } else { String::new() };
+        resumed.iter().try_for_each(|resumed| resumed.agrees(&digest, &settings)).map_err(Failure::input)?;
+        let opened = Opened::of(description, settings.threads, arguments.quiet)?;
+        (settings, opened, digest)
+    };
+    let done = header.map(|header| header.done.clone());
+    let log = arguments.log.as_deref().map(|path| match &done {
+        Some(done) => Log::resume(path, done.mutations, done.elapsed),
+        None => Log::create(path),
+    });
+    let log = log.transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());
-    for warning in &opened.warnings {
+    let arithmetic = resumed.as_ref().map(|resumed| elsewhere(resumed, &opened)).transpose()?.flatten();
+    for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
         progress.say(&format!("warning: {warning}"));
     }
-    let audience = Audience { snapshots: arguments.snapshot.map(Snapshots::every), output: &output, log, progress };
+    let began = done.as_ref().map_or(Duration::ZERO, |done| done.elapsed);
+    let keeper = keep.map(|path| Keeper::new(path, arguments.checkpoint, began)).transpose()?;
+    let snapshots = arguments.snapshot.map(|interval| Interval::from(began, interval));
+    let audience = Audience { snapshots, keeper, output: &output, log, progress };
 
     let scene_name = arguments.scene.path.display().to_string();
     let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
-    let outcome = render::run(&job, &audience).map_err(Failure::running)?;
+    let outcome = render::run_from(&job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
 
     output.write(&outcome.picture).map_err(Failure::running)?;
+    let checkpoint = audience.keeper.as_ref().and_then(Keeper::written);
     audience.finished(&Summary {
         status: outcome.status,
-        outputs: output.files(),
+        outputs: output.files().into_iter().chain(checkpoint).collect(),
         interrupted: outcome.interrupted,
-        warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
+        warnings: opened.warnings.iter().cloned().chain(told).chain(outcome.warnings).collect(),
     });
     Ok(())
+}
+
+/// A warning where a run is gone on with on a machine that computes otherwise than the one before. Chains that are yet to
+/// start would not find again there what was found here.
+fn elsewhere(resumed: &Resumed, opened: &Opened) -> Result<Option<String>, Failure> {
+    let (before, now) = (&resumed.header.arithmetic, opened.device.arithmetic());
+    if *before == now {
+        return Ok(None);
+    }
+    if resumed.header.settings_are_open() {
+        return Err(Failure::input(format_args!(
+            "{}: it was taken before chains started, by {before}; here it is {now}. Go on with it where it began, or begin \
+             anew",
+            resumed.path.display()
+        )));
+    }
+    Ok(Some(format!(
+        "the run was begun by {before} and goes on by {now}: the picture is as good, but last bits may differ"
+    )))
 }
 
 impl Render {
@@ -165,41 +219,82 @@ impl Render {
         }
     }
 
-    /// The run that is asked for, or everything that is wrong with it.
-    pub(super) fn settings(&self) -> Result<Settings, Failure> {
-        let no_budget = self.mpp.is_none() && self.time.is_none();
+    /// Where checkpoints go, if there are to be any.
+    fn keep(&self) -> Option<PathBuf> {
+        let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some();
+        let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
+        let beside = || self.output_name().with_extension("checkpoint");
+        wanted.then(|| self.checkpoint_file.clone().or(resumed).unwrap_or_else(beside))
+    }
+
+    /// The checkpoint to go on from, with a warning where it is not the last one.
+    fn resumed(&self, keep: Option<&Path>) -> Result<(Option<Resumed>, Option<String>), Failure> {
+        let path = match (&self.resume, keep) {
+            (None, None) => return Ok((None, None)),
+            (None, Some(keep)) if keep.exists() => {
+                return Err(Failure::input(format_args!(
+                    "{}: there is a checkpoint already; go on from it with --resume {}, or delete it to begin anew",
+                    keep.display(),
+                    keep.display()
+                )));
+            }
+            (None, Some(_)) => return Ok((None, None)),
+            (Some(path), None) if path == Path::new(AUTO) => {
+                return Err(Failure::input("--resume auto: give --checkpoint or --checkpoint-file, or name the file"));
+            }
+            (Some(path), Some(keep)) if path == Path::new(AUTO) => {
+                if !keep.exists() && !checkpoint::previous(keep).exists() {
+                    return Ok((None, None));
+                }
+                keep
+            }
+            (Some(path), _) => path,
+        };
+        let (resumed, warning) = checkpoint::open(path).map_err(Failure::input)?;
+        Ok((Some(resumed), warning))
+    }
+
+    /// The run that is asked for, or everything that is wrong with it. What is not given is as `before`, in a checkpoint
+    /// that is gone on with, had it, or as it usually is.
+    pub(super) fn settings(&self, before: Option<&Settings>) -> Result<Settings, Failure> {
+        let (mutations_per_pixel, time) = match (self.mpp, self.time, before) {
+            (None, None, Some(before)) => (before.mutations_per_pixel, before.time),
+            (None, None, None) => (Some(DEFAULT_MUTATIONS_PER_PIXEL), None),
+            given => (given.0, given.1),
+        };
+        let base = before.cloned().unwrap_or_default();
         let settings = Settings {
-            method: self.method,
-            mapping: self.mapping,
-            seed: self.seed,
+            method: self.method.unwrap_or(base.method),
+            mapping: self.mapping.unwrap_or(base.mapping),
+            seed: self.seed.unwrap_or(base.seed),
             threads: self.threads,
             pin: self.pin,
-            mutations_per_pixel: if no_budget { Some(DEFAULT_MUTATIONS_PER_PIXEL) } else { self.mpp },
-            time: self.time,
+            mutations_per_pixel,
+            time,
             ladder: match (&self.betas, &self.replicas) {
                 (Some(betas), _) => LadderChoice::Betas(betas.clone()),
                 (None, Some(replicas)) => replicas.clone(),
-                (None, None) => LadderChoice::default(),
+                (None, None) => base.ladder,
             },
-            combine: self.combine.unwrap_or_default(),
-            uniform_share: self.uniform_share,
-            measure: self.error.unwrap_or_default(),
-            layers: self.layers,
-            technique_changes: self.technique_changes.unwrap_or(Settings::default().technique_changes),
+            combine: self.combine.unwrap_or(base.combine),
+            uniform_share: self.uniform_share.or(base.uniform_share),
+            measure: self.error.unwrap_or(base.measure),
+            layers: self.layers || base.layers,
+            technique_changes: self.technique_changes.unwrap_or(base.technique_changes),
             mlt: MltSettings {
-                large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
-                normalisation: self.normalisation.unwrap_or_default(),
-                kelemen_weights: self.kelemen_weights,
+                large_steps: self.large_steps.unwrap_or(base.mlt.large_steps),
+                normalisation: self.normalisation.unwrap_or(base.mlt.normalisation),
+                kelemen_weights: self.kelemen_weights || base.mlt.kelemen_weights,
             },
             packet: self.packet,
         };
-        let mut faults = self.contradictions();
+        let mut faults = self.contradictions(&settings);
         faults.extend(settings.faults());
         if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
     }
 
     /// What is wrong with the options beside one another, which the settings no longer tell.
-    fn contradictions(&self) -> Vec<String> {
+    fn contradictions(&self, settings: &Settings) -> Vec<String> {
         let mut faults = self.scene.faults();
         if self.quiet && self.verbose {
             faults.push("--quiet and --verbose: give one of them".into());
@@ -216,13 +311,13 @@ impl Render {
             ("--layers", self.layers),
             ("--verbose", self.verbose),
         ];
-        if self.method != Method::ReplicaExchange {
-            let method = self.method.name();
+        let method = settings.method.name();
+        if settings.method != Method::ReplicaExchange {
             let given = of_a_ladder.iter().filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
         }
-        let multiplexed = self.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
-        if self.technique_changes == Some(true) && !(multiplexed && self.method != Method::Path) {
+        let multiplexed = settings.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
+        if self.technique_changes == Some(true) && !(multiplexed && settings.method != Method::Path) {
             faults.push(
                 "--technique-changes on: only chains of --method mlt or re on --mapping multiplexed have a technique to change"
                     .into(),
@@ -233,8 +328,7 @@ impl Render {
             ("--normalisation", self.normalisation.is_some()),
             ("--kelemen-weights", self.kelemen_weights),
         ];
-        if self.method != Method::Mlt {
-            let method = self.method.name();
+        if settings.method != Method::Mlt {
             let given = of_large_steps.iter().filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no large steps; only mlt has")));
         }
@@ -245,24 +339,39 @@ impl Render {
         faults
     }
 
+    /// The image's name.
+    fn output_name(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| default_output(&self.scene.path))
+    }
+
     /// Where the image goes; all files of the run are known to be writable afterwards.
-    fn output(&self) -> Result<Output, Failure> {
-        let path = self.output.clone().unwrap_or_else(|| default_output(&self.scene.path));
-        let output = Output::new(&path).map_err(Failure::input)?;
+    fn output(&self, keep: Option<&Path>, goes_on: bool) -> Result<Output, Failure> {
+        let output = Output::new(&self.output_name()).map_err(Failure::input)?;
+        let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
+        let mut taken: Vec<(PathBuf, &str)> =
+            output.files().iter().map(|file| (place(file), "the image goes there")).collect();
+        taken.push((place(&self.scene.path), "that is the scene"));
+        let others = [("--log", self.log.as_deref()), ("--checkpoint-file", keep)];
+        for (option, path) in others.into_iter().filter_map(|(option, path)| Some((option, path?))) {
+            if let Some((_, why)) = taken.iter().find(|(other, _)| *other == place(path)) {
+                return Err(Failure::input(format_args!("{option} {}: {why}", path.display())));
+            }
+            taken.push((place(path), "the log goes there"));
+        }
         if let Some(log) = &self.log {
-            let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
-            if output.files().iter().any(|file| place(file) == place(log)) {
-                return Err(Failure::input(format_args!("--log {}: the image goes there", log.display())));
-            }
-            if place(log) == place(&self.scene.path) {
-                return Err(Failure::input(format_args!("--log {}: that is the scene", log.display())));
-            }
             log::check(log).map_err(Failure::input)?;
+            if goes_on {
+                log::check_resumable(log).map_err(Failure::input)?;
+            }
         }
         output.check().map_err(Failure::input)?;
+        keep.map_or(Ok(()), check_writable).map_err(Failure::input)?;
         Ok(output)
     }
 }
+
+/// What `--resume` says where the checkpoint may not be there yet.
+const AUTO: &str = "auto";
 
 /// The scene's folder's name with `.exr`, in the current folder: scene files are mostly named alike.
 fn default_output(scene: &Path) -> PathBuf {
@@ -277,28 +386,85 @@ fn default_output(scene: &Path) -> PathBuf {
 struct Audience<'a> {
     progress: Progress,
     log: Option<Log>,
-    snapshots: Option<Snapshots>,
+    snapshots: Option<Interval>,
+    keeper: Option<Keeper>,
     output: &'a Output,
 }
 
-/// When the next snapshot is due.
-struct Snapshots {
-    interval: Duration,
+/// When something that happens at an interval is due.
+struct Interval {
+    length: Duration,
     due: Mutex<Duration>,
 }
 
-impl Snapshots {
-    fn every(interval: Duration) -> Snapshots {
-        Snapshots { interval, due: Mutex::new(interval) }
+impl Interval {
+    /// First so long after `begin`.
+    fn from(begin: Duration, length: Duration) -> Interval {
+        Interval { length, due: Mutex::new(begin + length) }
     }
 
     fn is_due(&self, elapsed: Duration) -> bool {
         elapsed >= *self.due.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts from now, so that slow files do not make snapshots follow one another without a pause.
+    /// Counts from now, so that slow files do not follow one another without a pause.
     fn taken(&self, elapsed: Duration) {
-        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = elapsed + self.interval;
+        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = elapsed + self.length;
+    }
+}
+
+/// Who writes checkpoints.
+struct Keeper {
+    path: PathBuf,
+    interval: Option<Interval>,
+    /// A signal asks for one.
+    asked: Arc<AtomicBool>,
+    /// The last one could be written.
+    written: AtomicBool,
+}
+
+impl Keeper {
+    fn new(path: PathBuf, interval: Option<Duration>, begin: Duration) -> Result<Keeper, Failure> {
+        let interval = interval.map(|interval| Interval::from(begin, interval));
+        Ok(Keeper { path, interval, asked: signals::checkpoint_flag()?, written: AtomicBool::new(false) })
+    }
+
+    fn is_due(&self, elapsed: Duration) -> bool {
+        self.asked.load(Relaxed) || self.interval.as_ref().is_some_and(|interval| interval.is_due(elapsed))
+    }
+
+    /// The file, if it is there.
+    fn written(&self) -> Option<PathBuf> {
+        self.written.load(Relaxed).then(|| self.path.clone())
+    }
+
+    /// Writes a checkpoint, or tells why not: the disk may have room again at the next. Returns whether a signal asked for
+    /// it.
+    fn write(&self, checkpoint: &Checkpoint) -> (bool, Result<(), FileError>) {
+        let asked = self.asked.swap(false, Relaxed);
+        let written = checkpoint.write(&self.path);
+        self.written.store(written.is_ok(), Relaxed);
+        (asked, written)
+    }
+}
+
+impl Audience<'_> {
+    fn keep(&self, checkpoint: &Checkpoint) {
+        let Some(keeper) = &self.keeper else { return };
+        let begin = Instant::now();
+        let (asked, written) = keeper.write(checkpoint);
+        match written {
+            Ok(()) => {
+                self.log.iter().for_each(|log| log.checkpoint(checkpoint.status, &keeper.path, begin.elapsed()));
+                if asked {
+                    self.progress.say(&format!("wrote {}", keeper.path.display()));
+                }
+            }
+            Err(error) => self.progress.say(&format!("warning: no checkpoint: {error}")),
+        }
+        // from its end on, as the run stands still for it
+        let now = checkpoint.status.elapsed + begin.elapsed();
+        keeper.interval.iter().for_each(|interval| interval.taken(now));
     }
 }
 
@@ -331,6 +497,18 @@ impl Observer for Audience<'_> {
         }
     }
 
+    fn wants_checkpoint(&self, status: &Status) -> bool {
+        self.keeper.as_ref().is_some_and(|keeper| keeper.is_due(status.elapsed))
+    }
+
+    fn checkpoint(&self, checkpoint: &Checkpoint) {
+        self.keep(checkpoint);
+    }
+
+    fn ended(&self, checkpoint: &Checkpoint) {
+        self.keep(checkpoint);
+    }
+
     fn finished(&self, summary: &Summary) {
         self.log.iter().for_each(|log| log.finished(summary));
         self.progress.finished(summary);
@@ -354,7 +532,7 @@ mod tests {
 
     fn settings(arguments: &[&str]) -> Result<Settings, String> {
         let arguments = ["relt", "scene.xml"].iter().chain(arguments);
-        Only::try_parse_from(arguments).unwrap().render.settings().map_err(|failure| failure.to_string())
+        Only::try_parse_from(arguments).unwrap().render.settings(None).map_err(|failure| failure.to_string())
     }
 
     #[test]
@@ -431,7 +609,7 @@ mod tests {
 
     #[test]
     fn snapshots_keep_their_distance() {
-        let snapshots = Snapshots::every(Duration::from_secs(10));
+        let snapshots = Interval::from(Duration::ZERO, Duration::from_secs(10));
         assert!(!snapshots.is_due(Duration::from_secs(9)));
         assert!(snapshots.is_due(Duration::from_secs(25)));
         snapshots.taken(Duration::from_secs(25));

@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod calibration;
+pub mod checkpoint;
 pub mod clock;
 pub mod engine;
 pub mod log;
@@ -16,7 +17,8 @@ mod tests;
 pub mod trial;
 
 pub use output::{Output, Picture};
-pub use run::{Job, Outcome, RenderError, engine, run};
+pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
+pub use run::{Job, Outcome, RenderError, engine, restored, run, run_from};
 pub use settings::{
     Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings,
 };

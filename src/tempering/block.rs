@@ -80,6 +80,8 @@ struct SavedPart {
     walkers: Walkers,
     tally: SavedTally,
     refused: Vec<u32>,
+    /// Of replayed starts, which no sweep has accounted for yet.
+    rays_and_faults: [u64; 2],
 }
 
 impl<W: Default + Send> Block<W> {
@@ -137,6 +139,7 @@ impl<W: Default + Send> Block<W> {
             walkers: part.walkers.clone(),
             tally: part.tally.saved(),
             refused: part.refused.clone(),
+            rays_and_faults: [part.evaluator.out.rays, part.evaluator.out.non_finite],
         };
         SavedBlock {
             parts: self.parts.iter().map(part).collect(),
@@ -155,6 +158,7 @@ impl<W: Default + Send> Block<W> {
             expect(saved.walkers.fits(part.replicas) && saved.refused.len() == part.replicas, "chains")?;
             part.tally.restore(saved.tally)?;
             (part.walkers, part.refused) = (saved.walkers, saved.refused);
+            [part.evaluator.out.rays, part.evaluator.out.non_finite] = saved.rays_and_faults;
         }
         expect(rung.len() == self.rung.len() && trips.fits(rung.len(), self.chains), "replicas")?;
         let mut replica_on = vec![u16::MAX; rung.len()];

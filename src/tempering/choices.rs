@@ -17,6 +17,17 @@ pub enum LadderChoice {
     Betas(Vec<f64>),
 }
 
+impl LadderChoice {
+    /// As on the command line: `auto`, `4` or `0,0.5,1`.
+    pub fn in_words(&self) -> String {
+        match self {
+            LadderChoice::Auto => "auto".into(),
+            LadderChoice::Replicas(k) => k.to_string(),
+            LadderChoice::Betas(betas) => betas.iter().map(f64::to_string).collect::<Vec<_>>().join(","),
+        }
+    }
+}
+
 /// How the estimates of the rungs become one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
