@@ -17,8 +17,8 @@ use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
-    self, Checkpoint, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer, Output,
-    PacketChoice, Picture, Resumed, RunStart, Settings, Status, Summary, checkpoint,
+    self, Checkpoint, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer,
+    Output, PacketChoice, Picture, Resumed, RunStart, Settings, Status, Summary, checkpoint,
 };
 use crate::tempering::RoundReport;
 

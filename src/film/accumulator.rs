@@ -555,7 +555,8 @@ mod tests {
         assert_eq!((film.layer(0), film.layer(1)), (back.layer(0), back.layer(1)));
         assert_eq!(film.overflowed(), back.overflowed());
         assert!(bytes.len() as u64 >= Accumulator::fewest_bytes(150, 2));
-        for mut other in [Accumulator::new(50, 3, 1, 4.0), Accumulator::new(5, 3, 2, 4.0), Accumulator::new(50, 3, 2, 8.0)]
+        for mut other in
+            [Accumulator::new(50, 3, 1, 4.0), Accumulator::new(5, 3, 2, 4.0), Accumulator::new(50, 3, 2, 8.0)]
         {
             assert!(restore(&mut other, &bytes).is_err());
         }

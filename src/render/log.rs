@@ -119,13 +119,8 @@ impl Log {
 
     /// A log to anything that can be written to.
     pub fn new(file: impl Write + Send + 'static) -> Log {
-        let state = State {
-            file: Box::new(file),
-            due: SHORTEST_GAP,
-            elapsed: Duration::ZERO,
-            goes_on: false,
-            failed: None,
-        };
+        let state =
+            State { file: Box::new(file), due: SHORTEST_GAP, elapsed: Duration::ZERO, goes_on: false, failed: None };
         Log { state: Mutex::new(state) }
     }
 

@@ -16,8 +16,8 @@ pub mod status;
 mod tests;
 pub mod trial;
 
-pub use output::{Output, Picture};
 pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
+pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, restored, run, run_from};
 pub use settings::{
     Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings,

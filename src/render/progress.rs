@@ -181,6 +181,7 @@ pub fn heading(start: &RunStart) -> String {
         (mpp, time) => words.extend(mpp.or(time)),
     }
     words.push(format!("{} thread{}", start.threads, if start.threads == 1 { "" } else { "s" }));
+    words.extend(start.resumed_at.map(|mutations| format!("going on after {} mutations", with_unit(mutations as f64))));
     words.join(", ")
 }
 

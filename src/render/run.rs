@@ -314,13 +314,7 @@ fn status(job: &Job, engine: &dyn Engine, watch: &Watch) -> Status {
     }
 }
 
-fn conclude(
-    job: &Job,
-    engine: &mut dyn Engine,
-    start: &RunStart,
-    watch: &Watch,
-    interrupted: bool,
-) -> Outcome {
+fn conclude(job: &Job, engine: &mut dyn Engine, start: &RunStart, watch: &Watch, interrupted: bool) -> Outcome {
     let status = status(job, engine, watch);
     let development = engine.develop();
     let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };

@@ -304,7 +304,13 @@ impl Tally {
     pub fn saved(&self) -> SavedTally {
         debug_assert!(self.splats.is_empty() && self.probes.is_empty(), "splats are deposited before state is saved");
         let Tally { histograms, counts, hot, even, tempered, .. } = self;
-        SavedTally { histograms: histograms.clone(), counts: counts.clone(), hot: *hot, even: *even, tempered: *tempered }
+        SavedTally {
+            histograms: histograms.clone(),
+            counts: counts.clone(),
+            hot: *hot,
+            even: *even,
+            tempered: *tempered,
+        }
     }
 
     /// Takes what was saved, of a ladder of as many rungs.

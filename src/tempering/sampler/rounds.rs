@@ -292,7 +292,8 @@ impl<W: Default + Send> Sampler<W> {
     /// Whether what is learnt now is the last.
     fn is_last_lesson(&self) -> bool {
         let next = self.evaluations as f64 + 2.0 * (self.schedule.length * self.a_sweep()) as f64;
-        self.schedule.round >= LEARNING_ROUNDS || self.planned.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
+        self.schedule.round >= LEARNING_ROUNDS
+            || self.planned.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
     }
 
     /// The weights and the share that serve best, where they are free.

@@ -14,7 +14,8 @@ use crate::{
     rng::Purpose,
     saved::{Source, Unfit, expect, write_value},
     tempering::{
-        Block, Histogram, Layers, PointGroups, Probes, Round, SavedBlock, SavedTally, Seen, Sum, tuning::Choice},
+        Block, Histogram, Layers, PointGroups, Probes, Round, SavedBlock, SavedTally, Seen, Sum, tuning::Choice,
+    },
 };
 
 /// All of a [`Sampler`] but for its portions and its film, and for what follows from its [`Setup`].
