@@ -18,7 +18,7 @@ use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
     self, Checkpoint, Combine, Job, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, Observer,
-    Output, PacketChoice, Picture, Resumed, RunStart, Settings, Status, Summary, checkpoint,
+    Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status, Summary, checkpoint,
 };
 use crate::tempering::RoundReport;
 
@@ -131,6 +131,15 @@ pub(super) struct Render {
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
     seed: Option<u64>,
 
+    /// Renders one of N independent parts of the job, each with its own random numbers and 1/N of --mpp, into a file that
+    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is
+    #[arg(long, value_name = "I/N", value_parser = values::part, allow_hyphen_values = true, help_heading = "Parts")]
+    part: Option<Parts>,
+
+    /// Renders all of N independent parts and makes one image of them, the same that relt merge would
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Parts")]
+    parts: Option<u32>,
+
     /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
     threads: Option<usize>,
@@ -150,7 +159,10 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let (resumed, told) = arguments.resumed(keep.as_deref())?;
     let header = resumed.as_ref().map(|resumed| &resumed.header);
     let settings = arguments.settings(header.map(|header| &header.start.settings))?;
-    let output = arguments.output(keep.as_deref(), resumed.is_some())?;
+    let is_part = settings.parts.only.is_some();
+    // a part has nothing to show but what it keeps
+    let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
+    let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part)?;
     let (settings, opened, scene_digest) = {
         let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
         let kept = keep.is_some() || resumed.is_some();
@@ -180,11 +192,21 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
     let outcome = render::run_from(&job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
 
-    output.write(&outcome.picture).map_err(Failure::running)?;
-    let checkpoint = audience.keeper.as_ref().and_then(Keeper::written);
+    let mut outputs = Vec::new();
+    if !is_part {
+        output.write(&outcome.picture).map_err(Failure::running)?;
+        outputs = output.files();
+    }
+    let kept = audience.keeper.as_ref().and_then(Keeper::written);
+    if is_part && kept.is_none() {
+        return Err(Failure::running("the part could not be written"));
+    }
+    if let Some(agreement) = &outcome.agreement {
+        audience.progress.say(&agreement.in_words());
+    }
     audience.finished(&Summary {
         status: outcome.status,
-        outputs: output.files().into_iter().chain(checkpoint).collect(),
+        outputs: outputs.into_iter().chain(kept).collect(),
         interrupted: outcome.interrupted,
         warnings: opened.warnings.iter().cloned().chain(told).chain(outcome.warnings).collect(),
     });
@@ -221,9 +243,13 @@ impl Render {
 
     /// Where checkpoints go, if there are to be any.
     fn keep(&self) -> Option<PathBuf> {
-        let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some();
+        let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some() || self.part.is_some();
         let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
-        let beside = || self.output_name().with_extension("checkpoint");
+        let beside = || {
+            let of = self.part.and_then(|parts| Some((parts.only?, parts.of)));
+            let extension = of.map_or("checkpoint".into(), |(part, of)| format!("{part}-of-{of}.part"));
+            self.output_name().with_extension(extension)
+        };
         wanted.then(|| self.checkpoint_file.clone().or(resumed).unwrap_or_else(beside))
     }
 
@@ -267,6 +293,11 @@ impl Render {
             method: self.method.unwrap_or(base.method),
             mapping: self.mapping.unwrap_or(base.mapping),
             seed: self.seed.unwrap_or(base.seed),
+            parts: match (self.part, self.parts) {
+                (Some(part), _) => part,
+                (None, Some(of)) => Parts { of, only: None },
+                (None, None) => base.parts,
+            },
             threads: self.threads,
             pin: self.pin,
             mutations_per_pixel,
@@ -311,6 +342,12 @@ impl Render {
             ("--layers", self.layers),
             ("--verbose", self.verbose),
         ];
+        if self.part.is_some() && self.parts.is_some() {
+            faults.push("--part and --parts: give one of them; one of the parts is run, or all".into());
+        }
+        if settings.parts.only.is_some() && self.snapshot.is_some() {
+            faults.push("--snapshot: a part has no image; relt merge makes one of its file at any time".into());
+        }
         let method = settings.method.name();
         if settings.method != Method::ReplicaExchange {
             let given = of_a_ladder.iter().filter(|(_, given)| *given);
@@ -345,7 +382,7 @@ impl Render {
     }
 
     /// Where the image goes; all files of the run are known to be writable afterwards.
-    fn output(&self, keep: Option<&Path>, goes_on: bool) -> Result<Output, Failure> {
+    fn output(&self, keep: Option<&Path>, goes_on: bool, is_part: bool) -> Result<Output, Failure> {
         let output = Output::new(&self.output_name()).map_err(Failure::input)?;
         let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
         let mut taken: Vec<(PathBuf, &str)> =
@@ -364,7 +401,9 @@ impl Render {
                 log::check_resumable(log).map_err(Failure::input)?;
             }
         }
-        output.check().map_err(Failure::input)?;
+        if !is_part {
+            output.check().map_err(Failure::input)?;
+        }
         keep.map_or(Ok(()), check_writable).map_err(Failure::input)?;
         Ok(output)
     }
@@ -543,12 +582,13 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let given = "--method re --betas 0,0.25,1 --combine target --uniform-share 0.25 --error absolute --layers \
-                     --mpp 10 --time 5m --seed 7 --threads 1 --pin";
+                     --mpp 10 --time 5m --seed 7 --part 3/8 --threads 1 --pin";
         let given: Vec<_> = given.split(' ').collect();
         let expected = Settings {
             mapping: MappingChoice::Auto,
             method: Method::ReplicaExchange,
             seed: 7,
+            parts: Parts { of: 8, only: Some(3) },
             threads: Some(1),
             pin: true,
             mutations_per_pixel: Some(10.0),

@@ -53,21 +53,21 @@ struct Block {
 
 impl Mlt {
     /// Does the first pass and puts the chains into their first states.
-    pub fn new(stage: &Stage, settings: &MltSettings, mutations: Option<u64>) -> Mlt {
+    pub fn new(stage: &Stage, rng: Rng, settings: &MltSettings, mutations: Option<u64>) -> Mlt {
         let (bootstrap_samples, plan) = plan(mutations);
         let large_steps = large_steps(settings);
         let sheet = stage.sheet();
-        let batches = first_pass(stage, bootstrap_samples);
+        let batches = first_pass(stage, rng, bootstrap_samples);
         let bootstrap: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
         // a black scene has no state to start from: no chains, a black image
-        let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
+        let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), rng, 0);
         let blocks = starts
             .par_chunks(plan.lanes())
             .enumerate()
             .map(|(i, starts)| Block {
-                chains: Baseline::new(&stage.mapping, stage.rng, (i * plan.lanes()) as u32, starts, large_steps),
+                chains: Baseline::new(&stage.mapping, rng, (i * plan.lanes()) as u32, starts, large_steps),
                 splats: Splats::new(large_steps.layers()),
             })
             .collect();
@@ -183,14 +183,14 @@ fn bootstrap_sample((sample, ln_g): (usize, &f64)) -> Start {
     Start { counter: bootstrap_counter(sample as u64), ln_g: *ln_g }
 }
 
-fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
+fn first_pass(stage: &Stage, rng: Rng, samples: u64) -> Vec<Batch> {
     let size = BOOTSTRAP_BATCH.min(samples.div_ceil(BOOTSTRAP_BATCHES));
     (0..samples.div_ceil(size))
         .into_par_iter()
         .map(|batch| {
             let samples = batch * size..((batch + 1) * size).min(samples);
             let counters: Vec<Counter> = samples.map(bootstrap_counter).collect();
-            let mut evaluator = Evaluator::<Workspace>::new(stage.rng, counters);
+            let mut evaluator = Evaluator::<Workspace>::new(rng, counters);
             evaluator.moves.fill(Move::Fresh);
             evaluator.evaluate(&stage.mapping, &Points::new(0));
             let out = evaluator.out;
@@ -278,6 +278,7 @@ impl Engine for Mlt {
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
             normalisation: Some(normalisation),
             warnings: film_warnings(&self.film),
+            agreement: None,
         }
     }
     fn set_wanted(&mut self, mutations: Option<u64>) {

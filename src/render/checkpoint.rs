@@ -17,12 +17,14 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     engine::{Engine, Sheet},
+    run::restored,
     settings::{MappingChoice, Method, Settings},
     status::{RunStart, SetUp, Status},
 };
 use crate::{
     checksum::{Checksum, Summed},
     film::file::{FileError, write_whole_and_keep},
+    rng::Rng,
     saved::Source,
     tempering::RoundReport,
 };
@@ -225,7 +227,11 @@ pub fn open_one(path: &Path) -> Result<Resumed, CheckpointError> {
     if (relt_checkpoint, relt.as_str()) != (FORMAT, env!("CARGO_PKG_VERSION")) {
         return Err(CheckpointError::Version { path: path.to_owned(), relt, format: relt_checkpoint });
     }
-    let header = serde_json::from_slice(&line).map_err(|error| unfit(&format!("its first line: {error}")))?;
+    let header: Header = serde_json::from_slice(&line).map_err(|error| unfit(&format!("its first line: {error}")))?;
+    let faults = header.start.settings.faults();
+    if !faults.is_empty() || header.sheet.pixels() == 0 || !(0.0..=f64::MAX).contains(&header.sheet.brightest) {
+        return Err(unfit(&format!("it is damaged: {}", faults.join("; "))).into());
+    }
     let body = length - line.len() as u64 - SEAL;
     Ok(Resumed { header, path: path.to_owned(), file, body })
 }
@@ -246,6 +252,15 @@ impl Resumed {
         Source::new(&mut self.file, self.body)
     }
 
+    /// The method with its parts, as it was saved.
+    pub fn engine(&mut self) -> Result<Box<dyn Engine>, CheckpointError> {
+        let Header { start, sheet, planned_mutations_per_pixel, .. } = self.header.clone();
+        let settings = &start.settings;
+        let planned = settings.parts.mutations(planned_mutations_per_pixel, sheet.pixels());
+        let engine = restored(&sheet, Rng::new(settings.seed), settings, planned, &mut self.body());
+        engine.map_err(|error| self.unfit(error))
+    }
+
     /// An error about what the file holds.
     pub fn unfit(&self, reason: impl ToString) -> CheckpointError {
         FileError::read(&self.path, reason).into()
@@ -254,7 +269,7 @@ impl Resumed {
     /// Whether its scene and settings are those of a run that is asked for. What changes no bit of the picture may differ:
     /// budgets, threads, packets of rays.
     pub fn agrees(&self, scene_digest: &str, settings: &Settings) -> Result<(), CheckpointError> {
-        let mut differences = differences(&self.header, settings);
+        let mut differences = differences(&self.header, settings, ["the checkpoint has", "asked for is"]);
         if self.header.scene_digest != scene_digest {
             differences.insert(
                 0,
@@ -264,6 +279,12 @@ impl Resumed {
                 ),
             );
         }
+        let [has, asked] = [self.header.start.settings.parts, settings.parts];
+        if has.of == asked.of && has.only != asked.only {
+            let part = |only: Option<u32>| only.map_or("all parts".into(), |part| format!("part {part}"));
+            let (has, asked) = (part(has.only), part(asked.only));
+            differences.push(format!("--part: the checkpoint has {has}, asked for is {asked}"));
+        }
         if differences.is_empty() {
             return Ok(());
         }
@@ -271,8 +292,9 @@ impl Resumed {
     }
 }
 
-/// What differs between the settings of a checkpoint and those asked for, in the words of the command line.
-fn differences(header: &Header, asked: &Settings) -> Vec<String> {
+/// What differs between the settings of a checkpoint and others, in the words of the command line; `whose` says before each
+/// what it is. Which of its parts a job runs is not looked at.
+pub(super) fn differences(header: &Header, others: &Settings, whose: [&str; 2]) -> Vec<String> {
     // every setting is either compared or named as one that may differ
     let Settings {
         method,
@@ -285,6 +307,7 @@ fn differences(header: &Header, asked: &Settings) -> Vec<String> {
         layers,
         technique_changes,
         mlt,
+        parts,
         threads: _,
         pin: _,
         mutations_per_pixel: _,
@@ -292,27 +315,28 @@ fn differences(header: &Header, asked: &Settings) -> Vec<String> {
         packet: _,
     } = &header.start.settings;
     let mut differences = Vec::new();
-    let mut compare = |option: &str, has: String, asked: String| {
-        if has != asked {
-            differences.push(format!("{option}: the checkpoint has {has}, asked for is {asked}"));
+    let mut compare = |option: &str, has: String, other: String| {
+        if has != other {
+            differences.push(format!("{option}: {} {has}, {} {other}", whose[0], whose[1]));
         }
     };
-    compare("--method", method.name().into(), asked.method.name().into());
-    if asked.mapping != MappingChoice::Fixed(header.start.mapping) {
-        compare("--mapping", mapping.name().into(), asked.mapping.name().into());
+    compare("--method", method.name().into(), others.method.name().into());
+    if others.mapping != MappingChoice::Fixed(header.start.mapping) {
+        compare("--mapping", mapping.name().into(), others.mapping.name().into());
     }
-    compare("--seed", seed.to_string(), asked.seed.to_string());
-    compare("--replicas or --betas", ladder.in_words(), asked.ladder.in_words());
-    compare("--combine", combine.name().into(), asked.combine.name().into());
+    compare("--seed", seed.to_string(), others.seed.to_string());
+    compare("--replicas or --betas", ladder.in_words(), others.ladder.in_words());
+    compare("--combine", combine.name().into(), others.combine.name().into());
     let share = |share: Option<f64>| share.map_or("tuned".into(), |share| share.to_string());
-    compare("--uniform-share", share(*uniform_share), share(asked.uniform_share));
-    compare("--error", measure.name().into(), asked.measure.name().into());
+    compare("--uniform-share", share(*uniform_share), share(others.uniform_share));
+    compare("--error", measure.name().into(), others.measure.name().into());
     let switch = |on: bool| if on { "on".to_owned() } else { "off".into() };
-    compare("--layers", switch(*layers), switch(asked.layers));
-    compare("--technique-changes", switch(*technique_changes), switch(asked.technique_changes));
-    compare("--large-steps", mlt.large_steps.to_string(), asked.mlt.large_steps.to_string());
-    compare("--normalisation", mlt.normalisation.name().into(), asked.mlt.normalisation.name().into());
-    compare("--kelemen-weights", switch(mlt.kelemen_weights), switch(asked.mlt.kelemen_weights));
+    compare("--layers", switch(*layers), switch(others.layers));
+    compare("--technique-changes", switch(*technique_changes), switch(others.technique_changes));
+    compare("--large-steps", mlt.large_steps.to_string(), others.mlt.large_steps.to_string());
+    compare("--normalisation", mlt.normalisation.name().into(), others.mlt.normalisation.name().into());
+    compare("--kelemen-weights", switch(mlt.kelemen_weights), switch(others.mlt.kelemen_weights));
+    compare("number of parts", parts.of.to_string(), others.parts.of.to_string());
     differences
 }
 

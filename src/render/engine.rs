@@ -4,13 +4,14 @@ use std::io::{self, Write};
 
 use serde::{Deserialize, Serialize};
 
+use super::parts::Agreement;
 use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
-    path::Mapping,
+    path::{Mapping, Workspace},
     rng::Rng,
     scene::description::FilmDescription,
-    tempering::{Estimate, RoundReport},
+    tempering::{Estimate, RoundReport, Sampler},
 };
 
 pub use super::status::Phase;
@@ -105,6 +106,8 @@ pub struct Development {
     pub normalisation: Option<Estimate>,
     /// What the person should know about the picture, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether the parts that it is made of tell the same, where there are several.
+    pub agreement: Option<Agreement>,
 }
 
 /// What a method counts.
@@ -146,6 +149,11 @@ pub trait Engine: Send {
     /// Writes all that it takes to go on from here: see [`restored`](super::run::restored). Reports that nobody has taken
     /// yet are not kept.
     fn save(&self, out: &mut dyn Write) -> io::Result<()>;
+    /// The sampler of a path tracer, whose sums may be added to those of others of the same job; nothing for methods whose sums
+    /// mean something to themselves only.
+    fn points(&self) -> Option<&Sampler<Workspace>> {
+        None
+    }
     /// Reports of the rounds that ended since this was last called, in order; none where there are no rounds.
     fn take_reports(&mut self) -> Vec<RoundReport> {
         Vec::new()

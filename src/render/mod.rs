@@ -6,7 +6,9 @@ pub mod checkpoint;
 pub mod clock;
 pub mod engine;
 pub mod log;
+mod merge;
 pub mod output;
+pub mod parts;
 pub mod progress;
 mod replica_exchange;
 mod run;
@@ -17,9 +19,10 @@ mod tests;
 pub mod trial;
 
 pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
+pub use merge::{Merged, MergedPart, merge};
 pub use output::{Output, Picture};
 pub use run::{Job, Outcome, RenderError, engine, restored, run, run_from};
 pub use settings::{
-    Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings,
+    Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Parts, Settings,
 };
 pub use status::{Observer, RunStart, SetUp, Status, Stop, Summary};

@@ -94,7 +94,12 @@ impl Engine for ReplicaExchange {
             layers: developed.layers,
             normalisation: Some(developed.learnt.luminance),
             warnings,
+            agreement: None,
         }
+    }
+
+    fn points(&self) -> Option<&Sampler<Workspace>> {
+        self.sampler.is_uniform_alone().then_some(&self.sampler)
     }
 
     fn set_wanted(&mut self, mutations: Option<u64>) {

@@ -1,6 +1,7 @@
 //! The render loop: slices of sweeps until the budget is spent.
 
 use std::{
+    convert::Infallible,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -15,6 +16,7 @@ use super::{
     clock::Clock,
     engine::{Engine, Phase, Sheet, Stage},
     output::{Picture, metadata},
+    parts::{Agreement, Several},
     replica_exchange::ReplicaExchange,
     settings::{MappingChoice, Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
@@ -47,6 +49,8 @@ pub struct Outcome {
     pub picture: Picture,
     /// Where the run stood at its end.
     pub status: Status,
+    /// Whether the parts that it had tell the same, where there were several.
+    pub agreement: Option<Agreement>,
     /// It was stopped before its budget was spent.
     pub interrupted: bool,
     /// What the person should know, one sentence each.
@@ -129,10 +133,10 @@ pub fn run_from(
     watch.set_up.calibration += watch.clock.elapsed() - began;
     let (mut engine, interrupted) = pool.install(|| -> Result<_, CheckpointError> {
         let began = watch.clock.elapsed();
-        let [planned, wanted] = [frame.planned, settings.mutations_per_pixel]
-            .map(|mpp| mpp.map(|mpp| (mpp * stage.pixels() as f64).ceil() as u64));
+        let [planned, wanted] =
+            [frame.planned, settings.mutations_per_pixel].map(|mpp| settings.parts.mutations(mpp, stage.pixels()));
         let mut engine = match &mut resumed {
-            Some(resumed) => frame.restored(resumed, settings, stage.rng, planned)?,
+            Some(resumed) => frame.restored(resumed)?,
             None => engine(&stage, settings, planned),
         };
         engine.set_wanted(wanted);
@@ -169,18 +173,11 @@ impl Frame<'_> {
     }
 
     /// The method as the checkpoint has it.
-    fn restored(
-        &self,
-        resumed: &mut Resumed,
-        settings: &Settings,
-        rng: Rng,
-        planned: Option<u64>,
-    ) -> Result<Box<dyn Engine>, CheckpointError> {
+    fn restored(&self, resumed: &mut Resumed) -> Result<Box<dyn Engine>, CheckpointError> {
         if resumed.header.sheet != self.sheet {
             return Err(resumed.unfit("its film is another than the scene's"));
         }
-        let engine = restored(&self.sheet, rng, settings, planned, &mut resumed.body());
-        engine.map_err(|error| resumed.unfit(error))
+        resumed.engine()
     }
 }
 
@@ -202,18 +199,21 @@ fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderErr
     builder.build().map_err(|e| RenderError::Threads { threads, reason: e.to_string() })
 }
 
-/// The method of those settings, ready to work on `mutations` evaluations or without end.
+/// The method of those settings with its parts, each ready to work on `mutations` evaluations or without end.
 pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
-    match settings.method {
-        Method::Mlt => Box::new(Mlt::new(stage, &settings.mlt, mutations)),
-        Method::Path | Method::ReplicaExchange => {
-            Box::new(ReplicaExchange::new(&stage.sheet(), stage.rng, settings, mutations))
-        }
-    }
+    let sheet = stage.sheet();
+    let make = |rng: Rng| -> Result<Box<dyn Engine>, Infallible> {
+        Ok(match settings.method {
+            Method::Mlt => Box::new(Mlt::new(stage, rng, &settings.mlt, mutations)),
+            Method::Path | Method::ReplicaExchange => Box::new(ReplicaExchange::new(&sheet, rng, settings, mutations)),
+        })
+    };
+    let Ok(engine) = Several::engine(settings.parts, sheet, stage.rng, make);
+    engine
 }
 
-/// The method that [`Engine::save`] wrote, of those settings, that sheet and those random numbers, and planned for as many
-/// mutations.
+/// The method that [`Engine::save`] wrote, of those settings, that sheet and those random numbers of the job, each part
+/// planned for as many mutations.
 pub fn restored(
     sheet: &Sheet,
     rng: Rng,
@@ -221,12 +221,15 @@ pub fn restored(
     planned: Option<u64>,
     from: &mut Source,
 ) -> Result<Box<dyn Engine>, Unfit> {
-    let engine: Box<dyn Engine> = match settings.method {
-        Method::Mlt => Box::new(Mlt::restored(sheet, rng, &settings.mlt, planned, from)?),
-        Method::Path | Method::ReplicaExchange => {
-            Box::new(ReplicaExchange::restored(sheet, rng, settings, planned, from)?)
-        }
+    let make = |rng: Rng| -> Result<Box<dyn Engine>, Unfit> {
+        Ok(match settings.method {
+            Method::Mlt => Box::new(Mlt::restored(sheet, rng, &settings.mlt, planned, from)?),
+            Method::Path | Method::ReplicaExchange => {
+                Box::new(ReplicaExchange::restored(sheet, rng, settings, planned, from)?)
+            }
+        })
     };
+    let engine = Several::engine(settings.parts, *sheet, rng, make)?;
     from.end()?;
     Ok(engine)
 }
@@ -335,9 +338,10 @@ fn conclude(job: &Job, engine: &mut dyn Engine, start: &RunStart, watch: &Watch,
             status.non_finite, status.mutations
         ));
     }
-    let metadata = metadata(start, &status);
+    let mut metadata = metadata(start, &status);
+    metadata.extend(development.agreement.iter().flat_map(Agreement::metadata));
     let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
-    Outcome { picture, status, interrupted, warnings }
+    Outcome { picture, status, agreement: development.agreement, interrupted, warnings }
 }
 
 fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
@@ -412,7 +416,7 @@ mod tests {
 
         fn develop(&self) -> Development {
             let image = Image::constant(1, 1, [1.0; 3]);
-            Development { image, layers: Vec::new(), normalisation: None, warnings: Vec::new() }
+            Development { image, layers: Vec::new(), normalisation: None, warnings: Vec::new(), agreement: None }
         }
 
         fn set_wanted(&mut self, _: Option<u64>) {}

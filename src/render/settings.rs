@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
+pub use super::parts::Parts;
 use crate::chain::LARGE_STEP_PROBABILITY;
 pub use crate::chain::Measure;
 use crate::embree::Width;
@@ -207,6 +208,9 @@ pub struct Settings {
     pub mapping: MappingChoice,
     /// Of all random numbers; the same seed gives the same image for the same budget in mutations.
     pub seed: u64,
+    /// Into how many independent parts the job is cut, and which of them is run.
+    #[serde(default)]
+    pub parts: Parts,
     /// Worker threads; as many as the machine runs at once where absent.
     pub threads: Option<usize>,
     /// Keep every worker on a core of its own.
@@ -243,6 +247,7 @@ impl Default for Settings {
             method: Method::default(),
             mapping: MappingChoice::default(),
             seed: 0,
+            parts: Parts::default(),
             threads: None,
             pin: false,
             mutations_per_pixel: Some(DEFAULT_MUTATIONS_PER_PIXEL),
@@ -302,6 +307,7 @@ impl Settings {
         if self.method == Method::Mlt {
             faults.extend(large_steps_fault(self.mlt.large_steps));
         }
+        faults.extend(parts_fault(self.parts));
         self.budget_faults(&mut faults);
         if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
             faults.push(format!("--threads {threads}: a run needs 1 to {MOST_THREADS} threads"));
@@ -335,6 +341,15 @@ impl Settings {
             Some(time) if time > LONGEST => faults.push("--time: more than a year is surely a mistake".into()),
             _ => {}
         }
+    }
+}
+
+fn parts_fault(Parts { of, only }: Parts) -> Option<String> {
+    match only {
+        _ if of == 0 => Some("--parts 0: a job has one part at least".into()),
+        _ if of > Parts::MOST => Some(format!("--parts {of}: at most {} parts", Parts::MOST)),
+        Some(only) if !(1..=of).contains(&only) => Some(format!("--part {only}/{of}: parts are 1 to {of}")),
+        _ => None,
     }
 }
 

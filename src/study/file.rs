@@ -175,7 +175,7 @@ const SNAPSHOTS: usize = 12;
 /// Errors are first taken after this part of the budget where the study does not say.
 const FIRST_SNAPSHOT: f64 = 1.0 / 64.0;
 /// Options that the study itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 12] = [
+const NOT_OPTIONS: [&str; 14] = [
     "seed",
     "mpp",
     "time",
@@ -185,6 +185,8 @@ const NOT_OPTIONS: [&str; 12] = [
     "checkpoint",
     "checkpoint-file",
     "resume",
+    "part",
+    "parts",
     "quiet",
     "verbose",
     "layers",

@@ -177,6 +177,16 @@ impl PointGroups {
         [seen.hot, seen.even]
     }
 
+    /// Adds what as many other groups saw, each to the one of its number.
+    pub fn merge(&self, other: &PointGroups) {
+        for (group, seen) in other.saved().into_iter().enumerate() {
+            let mut own = self.locked(group);
+            own.histogram.merge(&seen.histogram);
+            own.hot.merge(seen.hot);
+            own.even.merge(seen.even);
+        }
+    }
+
     /// Forgets ln g, which is about to mean something else.
     pub fn forget_histograms(&self) {
         (0..self.0.len()).for_each(|group| self.locked(group).histogram = Histogram::default());

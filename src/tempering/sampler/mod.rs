@@ -8,6 +8,7 @@
 
 mod development;
 mod learnt;
+mod pooling;
 mod reporting;
 mod rounds;
 mod saved;
@@ -83,6 +84,8 @@ pub struct Sampler<W> {
     rays_a_point: f64,
     sweeps: u64,
     evaluations: u64,
+    /// Stratified points of each part that is pooled; none where the sampler did all itself.
+    pooled: Vec<u64>,
     /// Evaluations that the run was planned for: how it is cut up and how long it learns follow from that.
     planned: Option<u64>,
     /// Evaluations to go through.
@@ -237,6 +240,7 @@ impl<W: Default + Send> Sampler<W> {
             effort: 0.0,
             states_a_rung: 0,
             evaluations: 0,
+            pooled: Vec::new(),
             planned: evaluations,
             wanted: evaluations,
             rays: 0,
