@@ -444,3 +444,86 @@ impl Engine for Several {
         reports
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::open_unit_f64;
+
+    /// A part with that brightness, told to have a standard error of 2 % at 10,000 mutations, and with four tiles that are
+    /// off by some of that.
+    fn told(number: u32, mutations: u64, brightness: f64) -> Told {
+        let error = 0.02 * (1e4 / mutations as f64).sqrt();
+        let off = |tile: u64| {
+            let counter = Counter { ladder: number, replica: 0, step: tile, purpose: Purpose::Primary };
+            let word = Rng::new(1).words(counter, 0)[0];
+            1.0 + error * 12f64.sqrt() * (open_unit_f64(word) - 0.5)
+        };
+        Told {
+            number,
+            mutations,
+            normalisation: Some(Estimate::from_ln(brightness.ln(), error)),
+            tiles: (0..64).map(|tile| brightness * off(tile)).collect(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Tiles are off by 2 % each, those of parts with four times the mutations by half of that: the mean of Σ n = 110,000
+    /// mutations by 2 %/√11 = 0.60 %. With 64 tiles and 4 degrees of freedom that is found to some 6 %.
+    #[test]
+    fn parts_that_agree_are_not_warned_of() {
+        let mutations = [10_000, 40_000, 10_000, 40_000, 10_000];
+        let parts: Vec<Told> = (1..).zip(mutations).map(|(number, n)| told(number, n, 0.5)).collect();
+        let agreement = Agreement::of(&parts);
+        assert_eq!(agreement.warnings, Vec::<String>::new());
+        assert!((agreement.tiles / 0.00603 - 1.0).abs() < 0.25, "{}", agreement.tiles);
+        assert!(agreement.normalisation < 1e-6, "they are all the same: {}", agreement.normalisation);
+        let all = mean_of(parts.iter()).unwrap();
+        assert!((all.value - 0.5).abs() < 1e-12 && (all.relative_error / 0.00603 - 1.0).abs() < 0.01, "{all:?}");
+    }
+
+    #[test]
+    fn a_part_that_found_other_light_is_named() {
+        let mut parts: Vec<Told> = (1..=5).map(|number| told(number, 10_000, 0.5)).collect();
+        parts[3] = told(4, 10_000, 0.6);
+        let agreement = Agreement::of(&parts);
+        assert!(agreement.normalisation > 4.0, "{}", agreement.normalisation);
+        let [brightness, tiles] = &agreement.warnings[..] else { panic!("{:?}", agreement.warnings) };
+        assert!(brightness.contains("part 4: its brightness is 8.0 standard errors from"), "{brightness}");
+        assert!(tiles.starts_with("part 4: its picture is "), "{tiles}");
+    }
+
+    #[test]
+    fn tiles_cover_pictures_of_any_size() {
+        for (width, height) in [(1, 1), (3, 40), (17, 16), (100, 1)] {
+            let tiles = tiles(&Image::constant(width, height, [0.5; 3]));
+            assert_eq!(tiles.len(), (width.min(16) * height.min(16)) as usize);
+            assert!(tiles.iter().all(|tile| (tile - 0.5).abs() < 1e-6), "{width} × {height}: {tiles:?}");
+        }
+    }
+
+    /// Two of three parts have the second rung, and one of them weighs twice as much as either of the others.
+    #[test]
+    fn pictures_are_weighed_by_mutations_and_missing_rungs_are_black() {
+        let mut mean = Mean::default();
+        for (value, weight) in [(1.0, 1.0), (3.0, 2.0), (5.0, 1.0)] {
+            let image = Image::constant(2, 1, [value; 3]);
+            let gray = Plane::Gray(vec![value; 2]);
+            let mut layers = vec![("density".into(), gray), ("target".into(), Plane::Rgb(image.clone()))];
+            if value != 5.0 {
+                layers.push(("rung2".into(), Plane::Rgb(image.clone())));
+                layers.push(("uniform".into(), Plane::Rgb(image.clone())));
+            }
+            mean.add(&image, layers, weight);
+        }
+        let (image, layers) = mean.finish([2, 1]);
+        assert_eq!(image, Image::constant(2, 1, [3.0; 3]));
+        let expected = [
+            ("density", Plane::Gray(vec![9.0; 2])),
+            ("target", Plane::Rgb(Image::constant(2, 1, [3.0; 3]))),
+            ("rung2", Plane::Rgb(Image::constant(2, 1, [1.75; 3]))),
+            ("uniform", Plane::Rgb(Image::constant(2, 1, [(7.0f64 / 3.0) as f32; 3]))),
+        ];
+        assert_eq!(layers, expected.map(|(name, plane)| (name.to_owned(), plane)));
+    }
+}

@@ -96,11 +96,9 @@ impl<W: Default + Send> Planes<'_, W> {
     fn even(&self) -> Image {
         let layer = self.sampler.screen.layers.even.expect("a layer of stratified points");
         let [stratified, _] = self.sampler.points;
-        let each = match &self.sampler.pooled[..] {
-            [] => &[stratified][..],
-            pooled => pooled,
-        };
-        let points = self.points(layer, each, 0, stratified as f64);
+        // runs go through the pixels in the same order
+        let longest = if self.sampler.longest > 0 { self.sampler.longest } else { stratified };
+        let points = self.points(layer, [longest, 0], stratified as f64);
         self.image(|i| points.of(i))
     }
 
@@ -108,7 +106,7 @@ impl<W: Default + Send> Planes<'_, W> {
     fn uniform(&self) -> Image {
         let layer = self.sampler.screen.layers.uniform.expect("a layer of uniform points");
         let [stratified, offered] = self.sampler.points;
-        let points = self.points(layer, &[stratified], offered, (stratified + offered) as f64);
+        let points = self.points(layer, [stratified, offered], (stratified + offered) as f64);
         self.image(|i| points.of(i))
     }
 
@@ -117,14 +115,14 @@ impl<W: Default + Send> Planes<'_, W> {
         let layer = self.sampler.screen.layers.hot.expect("a layer of the balanced image");
         let [stratified, offered] = self.sampler.points;
         // a round's points share its evaluations among them as their effort, so all of them sum to all of these
-        self.points(layer, &[stratified - self.sampler.bootstrap], offered, self.sampler.effort)
+        self.points(layer, [stratified - self.sampler.bootstrap, offered], self.sampler.effort)
     }
 
-    /// Of a layer with so many stratified points of each run that is pooled and so many offered ones, of weight `weight` all
+    /// Of a layer with so many stratified points in the order of pixels and so many offered ones, of weight `weight` all
     /// together.
-    fn points(&self, layer: PointLayer, stratified: &[u64], offered: u64, weight: f64) -> PointImage {
+    fn points(&self, layer: PointLayer, points: [u64; 2], weight: f64) -> PointImage {
         let own = self.sampler.screen.film.layer_with(layer.own, self.pending);
-        let means = PixelMeans::new(&own, (stratified, offered), &self.sampler.screen.footprint);
+        let means = PixelMeans::new(&own, points, &self.sampler.screen.footprint);
         let scale = if weight > 0.0 { self.pixels() / weight } else { 0.0 };
         PointImage { own, means, elsewhere: self.sums(layer.elsewhere).map(|sums| (sums, scale)) }
     }
@@ -208,13 +206,12 @@ struct PixelMeans {
 }
 
 impl PixelMeans {
-    /// For what was gathered on that film: Σ of colours and of weights by pixel. `stratified`, by run, and `offered` are the
-    /// numbers of points of either kind; with a box filter a point is in one pixel.
-    fn new(sums: &[[f64; 4]], (stratified, offered): (&[u64], u64), footprint: &Footprint) -> PixelMeans {
+    /// For what was gathered on that film: Σ of colours and of weights by pixel. `stratified` and `offered` are the numbers
+    /// of points of either kind, of several runs the largest of the former; with a box filter a point is in one pixel.
+    fn new(sums: &[[f64; 4]], [stratified, offered]: [u64; 2], footprint: &Footprint) -> PixelMeans {
         let pixels = sums.len() as f64;
-        // Π (1 − s/P)⁺ (1 − 1/P)^o, the share of pixels that get none
-        let unvisited: f64 = stratified.iter().map(|points| (1.0 - *points as f64 / pixels).max(0.0)).product();
-        let none = unvisited * libm::exp(offered as f64 * libm::log1p(-1.0 / pixels));
+        // (1 − s/P)⁺ (1 − 1/P)^o, the share of pixels that get none
+        let none = (1.0 - stratified as f64 / pixels).max(0.0) * libm::exp(offered as f64 * libm::log1p(-1.0 / pixels));
         let some = if pixels > 1.0 { 1.0 - none } else { 1.0 };
         let average = sums.iter().map(|sum| sum[3]).sum::<f64>() / pixels;
         PixelMeans {
@@ -239,12 +236,12 @@ mod tests {
         // three pixels of ten samples of 1 each, whose weights sum to 10 on average
         let sums = [[19.5, 19.5, 19.5, 19.5], [10.4, 10.4, 10.4, 10.4], [0.1, 0.1, 0.1, 0.1]];
         let means = |filter| {
-            let means = PixelMeans::new(&sums, (&[30], 0), &Footprint::new(filter, 3, 1));
+            let means = PixelMeans::new(&sums, [30, 0], &Footprint::new(filter, 3, 1));
             sums.map(|sum| means.of(&sum)[0])
         };
         assert_eq!(means(Filter::Gaussian { stddev: 0.5 }), [1.0; 3], "weights above 0 are trusted");
         assert_eq!(means(Filter::Lanczos { lobes: 3 }), [1.0, 1.0, 0.1 / 5.0]);
-        let below = PixelMeans::new(&sums, (&[30], 0), &Footprint::new(Filter::Lanczos { lobes: 3 }, 3, 1));
+        let below = PixelMeans::new(&sums, [30, 0], &Footprint::new(Filter::Lanczos { lobes: 3 }, 3, 1));
         assert_eq!(below.of(&[2.0, 1.0, 0.0, -0.5]), [0.4, 0.2, 0.0]);
     }
 }

@@ -84,8 +84,8 @@ pub struct Sampler<W> {
     rays_a_point: f64,
     sweeps: u64,
     evaluations: u64,
-    /// Stratified points of each part that is pooled; none where the sampler did all itself.
-    pooled: Vec<u64>,
+    /// Stratified points of the longest run that is pooled; 0 where the sampler did all itself.
+    longest: u64,
     /// Evaluations that the run was planned for: how it is cut up and how long it learns follow from that.
     planned: Option<u64>,
     /// Evaluations to go through.
@@ -240,7 +240,7 @@ impl<W: Default + Send> Sampler<W> {
             effort: 0.0,
             states_a_rung: 0,
             evaluations: 0,
-            pooled: Vec::new(),
+            longest: 0,
             planned: evaluations,
             wanted: evaluations,
             rays: 0,

@@ -30,7 +30,7 @@ impl<W: Default + Send> Sampler<W> {
         assert!(self.is_uniform_alone() && other.is_uniform_alone(), "chains cannot be pooled");
         self.screen.film.merge(&other.screen.film);
         self.screen.groups.merge(&other.screen.groups);
-        self.pooled.push(other.points[0]);
+        self.longest = self.longest.max(other.points[0]);
         self.points[0] += other.points[0];
         self.sweeps += other.sweeps;
         self.evaluations += other.evaluations;
