@@ -226,10 +226,10 @@ fn points_of_path_tracers_are_pooled_pixel_by_pixel() {
     assert!(n_a.contains(&3.0) && n_a.contains(&4.0), "whole passes only");
     for (i, pixel) in all.image.pixels.iter().enumerate() {
         assert_eq!(n[i], n_a[i] + n_b[i]);
-        for channel in 0..3 {
+        for (channel, value) in pixel.iter().enumerate() {
             let [a, b] = [&a, &b].map(|file| file.image.pixels[i][channel]);
             let expected = (n_a[i] * a + n_b[i] * b) / n[i];
-            assert!((pixel[channel] - expected).abs() <= 1e-6 * expected, "{} at {i}, not {expected}", pixel[channel]);
+            assert!((value - expected).abs() <= 1e-6 * expected, "{value} at {i}, not {expected}");
         }
     }
 }

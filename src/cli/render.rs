@@ -163,14 +163,13 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     // a part has nothing to show but what it keeps
     let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
     let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part)?;
-    let (settings, opened, scene_digest) = {
-        let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
-        let kept = keep.is_some() || resumed.is_some();
-        let digest = if kept { checkpoint::scene_digest(&description) } else { String::new() };
-        resumed.iter().try_for_each(|resumed| resumed.agrees(&digest, &settings)).map_err(Failure::input)?;
-        let opened = Opened::of(description, settings.threads, arguments.quiet)?;
-        (settings, opened, digest)
-    };
+    // from now on, also while the scene is read, the signal is no longer the end
+    let asked = keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
+    let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
+    let is_kept = keep.is_some() || resumed.is_some();
+    let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
+    resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
+    let opened = Opened::of(description, settings.threads, arguments.quiet)?;
     let done = header.map(|header| header.done.clone());
     let log = arguments.log.as_deref().map(|path| match &done {
         Some(done) => Log::resume(path, done.mutations, done.elapsed),
@@ -184,7 +183,7 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
         progress.say(&format!("warning: {warning}"));
     }
     let began = done.as_ref().map_or(Duration::ZERO, |done| done.elapsed);
-    let keeper = keep.map(|path| Keeper::new(path, arguments.checkpoint, began)).transpose()?;
+    let keeper = keep.zip(asked).map(|(path, asked)| Keeper::new(path, asked, arguments.checkpoint, began));
     let snapshots = arguments.snapshot.map(|interval| Interval::from(began, interval));
     let audience = Audience { snapshots, keeper, output: &output, log, progress };
 
@@ -463,9 +462,9 @@ struct Keeper {
 }
 
 impl Keeper {
-    fn new(path: PathBuf, interval: Option<Duration>, begin: Duration) -> Result<Keeper, Failure> {
+    fn new(path: PathBuf, asked: Arc<AtomicBool>, interval: Option<Duration>, begin: Duration) -> Keeper {
         let interval = interval.map(|interval| Interval::from(begin, interval));
-        Ok(Keeper { path, interval, asked: signals::checkpoint_flag()?, written: AtomicBool::new(false) })
+        Keeper { path, interval, asked, written: AtomicBool::new(false) }
     }
 
     fn is_due(&self, elapsed: Duration) -> bool {

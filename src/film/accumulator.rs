@@ -264,7 +264,7 @@ impl Accumulator {
     }
 
     /// Writes all sums, exactly: number of layers, pixels and splats beyond the range, unit, then the sums layer by layer,
-    /// each as short as it may be (see [`encode`]).
+    /// each as short as it may be.
     pub fn save(&self, out: &mut dyn Write) -> io::Result<()> {
         for number in [self.layers.len() as u64, self.pixels as u64, self.overflowed(), self.rgb.exponent as u64] {
             out.write_all(&number.to_le_bytes())?;
