@@ -219,7 +219,7 @@ fn elsewhere(resumed: &Resumed, opened: &Opened) -> Result<Option<String>, Failu
     if *before == now {
         return Ok(None);
     }
-    if resumed.header.settings_are_open() {
+    if resumed.header.chains_are_to_start() {
         return Err(Failure::input(format_args!(
             "{}: it was taken before chains started, by {before}; here it is {now}. Go on with it where it began, or begin \
              anew",

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     engine::{Engine, Sheet},
     run::restored,
-    settings::{MappingChoice, Method, Settings},
+    settings::{LadderChoice, MappingChoice, Method, Settings},
     status::{RunStart, SetUp, Status},
 };
 use crate::{
@@ -62,9 +62,11 @@ pub struct Header {
 }
 
 impl Header {
-    /// Whether chains may not have started yet.
-    pub fn settings_are_open(&self) -> bool {
-        self.start.settings.method == Method::ReplicaExchange && self.last_round.is_none()
+    /// Whether chains are yet to start, from samples that must then be found again.
+    pub fn chains_are_to_start(&self) -> bool {
+        let Settings { method, ladder, .. } = &self.start.settings;
+        let has_chains = *method == Method::ReplicaExchange && *ladder != LadderChoice::Replicas(1);
+        has_chains && self.last_round.is_none()
     }
 }
 
