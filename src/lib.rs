@@ -28,6 +28,7 @@
 //! ```
 
 pub mod chain;
+pub mod checksum;
 pub mod cli;
 pub mod convert;
 pub mod embree;
@@ -38,6 +39,7 @@ pub mod path;
 pub mod render;
 pub mod rng;
 pub mod sample;
+pub mod saved;
 pub mod scene;
 pub mod study;
 pub mod tempering;

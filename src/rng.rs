@@ -34,6 +34,8 @@ pub enum Purpose {
     Trial = 9,
     /// Changes of technique.
     Technique = 10,
+    /// Seeds of the parts of a job.
+    Part = 11,
 }
 
 /// Identifies one call for four random words.
@@ -71,7 +73,13 @@ impl Rng {
         philox(counter.words(block).map(|word| [word]), self.key).map(|[word]| word)
     }
 
-    /// The same for [`SIDE_BY_SIDE`] counters at once, which the compiler turns into vector instructions: word i of
+    /// A seed for another source, independent of all that this one gives: the first two words of the counter.
+    pub fn seed(&self, counter: Counter) -> u64 {
+        let [low, high, ..] = self.words(counter, 0);
+        u64::from(high) << 32 | u64::from(low)
+    }
+
+    /// Four words for each of [`SIDE_BY_SIDE`] counters at once, which the compiler turns into vector instructions: word i of
     /// counter j is at `[i][j]`.
     #[inline(always)]
     pub fn words_side_by_side(&self, counters: [Counter; SIDE_BY_SIDE], block: u16) -> [[u32; SIDE_BY_SIDE]; 4] {

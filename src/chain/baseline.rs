@@ -2,11 +2,14 @@
 //!
 //! Source: Kelemen et al. 2002; the paper's comparison renders with it in two passes.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
     path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
+    saved::{Unfit, expect},
 };
 
 /// Probability of proposing a fresh point of the cube instead of a small step, where nothing else is asked for
@@ -66,7 +69,76 @@ pub struct Baseline<W> {
     pub large_sum: f64,
 }
 
+/// A [`Baseline`] as it is saved.
+#[derive(Serialize, Deserialize)]
+pub struct SavedBaseline {
+    walkers: Walkers,
+    steps: u64,
+    changed: TechniqueChanges,
+    small: (f64, u64),
+    large: (f64, u64),
+    large_sum: f64,
+    refused: Vec<u32>,
+    longest_rejection: u32,
+    halves: [Moments; 2],
+    rays: u64,
+    faults: Faults,
+}
+
 impl<W: Default> Baseline<W> {
+    /// All that there is to save between steps.
+    pub fn saved(&self) -> SavedBaseline {
+        SavedBaseline {
+            walkers: self.walkers.clone(),
+            steps: self.steps,
+            changed: self.changed,
+            small: self.small,
+            large: self.large,
+            large_sum: self.large_sum,
+            refused: self.refused.clone(),
+            longest_rejection: self.longest_rejection,
+            halves: self.halves,
+            rays: self.evaluator.out.rays,
+            faults: self.evaluator.out.faults.clone(),
+        }
+    }
+
+    /// Chains `first_chain`, `first_chain + 1`, … as they were saved.
+    pub fn restored(
+        rng: Rng,
+        first_chain: u32,
+        chains: usize,
+        saved: SavedBaseline,
+        large_steps: LargeSteps,
+    ) -> Result<Baseline<W>, Unfit> {
+        let SavedBaseline { walkers, steps, changed, small, large, large_sum, .. } = saved;
+        let SavedBaseline { refused, longest_rejection, halves, rays, faults, .. } = saved;
+        expect(walkers.fits(chains) && refused.len() == chains, "chains")?;
+        let mut evaluator = Baseline::evaluator(rng, first_chain, chains);
+        (evaluator.out.rays, evaluator.out.faults) = (rays, faults);
+        let decisions = vec![0.0; chains];
+        Ok(Baseline {
+            walkers,
+            evaluator,
+            large_steps,
+            decisions,
+            steps,
+            refused,
+            longest_rejection,
+            halves,
+            changed,
+            small,
+            large,
+            large_sum,
+        })
+    }
+
+    fn evaluator(rng: Rng, first_chain: u32, chains: usize) -> Evaluator<W> {
+        let counter =
+            |lane: usize| Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
+        Evaluator::new(rng, (0..chains).map(counter).collect())
+    }
+
     /// Chains `first_chain`, `first_chain + 1`, … put into those states by replaying them.
     pub fn new<T: Target<Workspace = W>>(
         target: &T,
@@ -75,10 +147,8 @@ impl<W: Default> Baseline<W> {
         starts: &[Start],
         large_steps: LargeSteps,
     ) -> Baseline<W> {
-        let counter =
-            |lane: usize| Counter { ladder: first_chain + lane as u32, replica: 0, step: 0, purpose: Purpose::Primary };
         let mut walkers = Walkers::new(starts.len());
-        let mut evaluator = Evaluator::new(rng, (0..starts.len()).map(counter).collect());
+        let mut evaluator = Baseline::evaluator(rng, first_chain, starts.len());
         replay(target, starts, &mut walkers, &mut evaluator);
         Baseline {
             walkers,
@@ -183,7 +253,7 @@ impl<W: Default> Baseline<W> {
 }
 
 /// Sums of a number over states.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
     /// How many states.
     pub states: f64,

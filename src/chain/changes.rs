@@ -3,7 +3,7 @@
 //! Changes are made beside the steps: some chains, before they step, go on to another technique of their path. That leaves
 //! the distribution unchanged, so the weights of steps stay what they are; only the old state's is recorded where it ends.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Evaluator, Target, Walkers, acceptance};
 use crate::{
@@ -29,7 +29,7 @@ pub const TECHNIQUE_CHANGES: f64 = 0.25;
 const FIRST_BLOCK: u16 = 1 << 14;
 
 /// What became of changes of technique, whose evaluations are not counted as mutations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TechniqueChanges {
     /// Those that were drawn and led to the technique at work.
     pub stayed: u64,

@@ -1,9 +1,11 @@
 //! Where on the film chains are wanted: a weight that the scalar contribution carries.
 
+use serde::{Deserialize, Serialize};
+
 use crate::path::Whole;
 
 /// The error that a run is to make small.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Error relative to the luminance, absolute where it is darker than half the mean: about the square root of relMSE.
@@ -45,7 +47,7 @@ const FLOOR: f64 = 0.5;
 /// so for the same reason). On the scenes of the project half of all light is a lamp that is seen directly, on which
 /// chains would waste half of their time. The image is right for any W > 0. Of a point that contributes in several
 /// places every part is weighed by where it is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Importance {
     size: [f32; 2],
     /// Pixels a side of a tile.
@@ -84,6 +86,15 @@ impl Importance {
             -libm::log((luminance / mean).max(0.0) + FLOOR)
         });
         Importance { size: [width as f32, height as f32], tile, columns, ln_weights: ln_weights.collect() }
+    }
+
+    /// Whether every position on a film of that size has an importance.
+    pub fn fits(&self, [width, height]: [u32; 2]) -> bool {
+        let of_size = self.size == [width as f32, height as f32] && self.tile > 0;
+        of_size && {
+            let [columns, rows] = [width, height].map(|extent| extent.div_ceil(self.tile));
+            self.columns == columns && self.ln_weights.len() as u64 == u64::from(columns) * u64::from(rows)
+        }
     }
 
     /// ln Σ W · luminance over all parts of a contribution whose ln g is the luminance of the whole; −∞ where there is

@@ -10,7 +10,7 @@ mod start;
 mod target;
 mod walkers;
 
-pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Moments, baseline_layer};
+pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Moments, SavedBaseline, baseline_layer};
 pub use changes::{TECHNIQUE_CHANGES, TechniqueChanges};
 pub use importance::{Importance, Measure};
 pub use metropolis::acceptance;

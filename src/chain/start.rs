@@ -1,5 +1,7 @@
 //! States for chains to start from, resampled from independent samples.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Evaluator, Target, Walkers};
 use crate::{
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -7,7 +9,7 @@ use crate::{
 };
 
 /// Where a chain starts: the counter of an independent sample to replay and the ln g that it must give again.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Start {
     /// Counter of the sample.
     pub counter: Counter,

@@ -1,5 +1,7 @@
 //! States of many chains.
 
+use serde::{Deserialize, Serialize};
+
 use super::acceptance;
 use crate::{
     path::{Contribution, Contributions, Elsewhere, Whole},
@@ -9,6 +11,7 @@ use crate::{
 /// The current states of a batch of chains, each with the expected weight it has gathered and not yet recorded.
 ///
 /// Chains are put into lit states before their first step, and never leave the light: a dark proposal is not accepted.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Walkers {
     /// Where each chain is.
     pub points: Points,
@@ -29,6 +32,12 @@ impl Walkers {
             elsewhere: Elsewhere::new(lanes),
             pending: vec![0.0; lanes],
         }
+    }
+
+    /// Whether these are so many chains, all of which can go on; what was read from a file may be anything.
+    pub fn fits(&self, lanes: usize) -> bool {
+        let of = [self.points.lanes(), self.states.len(), self.pending.len()];
+        of == [lanes; 3] && self.elsewhere.fits(lanes) && self.states.iter().all(|state| !state.ln_g.is_nan())
     }
 
     /// All that a chain's state contributes.

@@ -6,6 +6,7 @@ mod failure;
 mod info;
 mod ladder;
 mod loading;
+mod merge;
 mod reference;
 mod render;
 mod replay;
@@ -31,6 +32,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Merge(merge::Merge),
     Info(info::Info),
     Replay(Box<replay::Replay>),
     Ladder(ladder::Ladder),
@@ -44,7 +46,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
-  2    nothing was begun: faulty options, scene or images, no Embree, unwritable files
+  2    nothing was begun: faulty options, scene or images, no Embree, unwritable files, checkpoints of something else
        relt convert: also with --strict where something would be left out
   3    relt render --strict: the picture cannot be trusted
        relt compare: an image exceeds a --max-… that was given
@@ -64,6 +66,7 @@ pub fn main() -> ExitCode {
     };
     let done = match arguments.command {
         Command::Render(arguments) => render::run(*arguments),
+        Command::Merge(arguments) => merge::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Replay(arguments) => replay::run(*arguments),
         Command::Ladder(arguments) => ladder::run(arguments),

@@ -1,21 +1,23 @@
 //! `relt render`: from a scene file to an image.
 
 use std::path::{Path, PathBuf, absolute};
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 
 use super::failure::Failure;
 use super::run_options::RunOptions;
-use super::scene::SceneArguments;
+use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
+use crate::film::file::{FileError, check_writable};
 use crate::render::log::{self, Log};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::{
-    self, Health, Job, Observer, Output, PacketChoice, Picture, RunStart, Settings, Status, Summary, Verdict, replay,
+    self, Checkpoint, Health, Job, Observer, Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status,
+    Summary, Verdict, checkpoint, replay,
 };
 use crate::tempering::RoundReport;
 
@@ -38,13 +40,27 @@ pub(super) struct Render {
     #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
     snapshot: Option<Duration>,
 
-    /// Writes a log, one JSON object a line
+    /// Writes a log, one JSON object a line; with --resume it goes on in the file that is there
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     log: Option<PathBuf>,
 
     /// Ends with exit code 3 where the picture cannot be trusted (verdict bad); it is written all the same
     #[arg(long, help_heading = "Files")]
     strict: bool,
+
+    /// Writes all that it takes to go on later, at this interval, such as 5m, on SIGUSR1, and at the end, early or not
+    #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
+    checkpoint: Option<Duration>,
+
+    /// Where that goes; alone, it is written on SIGUSR1 and at the end only [default: the image's name with .checkpoint, or
+    /// the file that --resume names]
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    checkpoint_file: Option<PathBuf>,
+
+    /// Goes on from a checkpoint, with its settings; budgets are those of the whole run. auto: from the file that
+    /// --checkpoint writes, or from the beginning where there is none yet
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
+    resume: Option<PathBuf>,
 
     /// Shows nothing but errors
     #[arg(short, long, help_heading = "Files")]
@@ -58,6 +74,15 @@ pub(super) struct Render {
     #[arg(long, help_heading = "Files")]
     layers: bool,
 
+    /// Renders one of N independent parts of the job, each with its own random numbers and 1/N of --mpp, into a file that
+    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is
+    #[arg(long, value_name = "I/N", value_parser = values::part, allow_hyphen_values = true, help_heading = "Parts")]
+    part: Option<Parts>,
+
+    /// Renders all of N independent parts and makes one image of them, the same that relt merge would
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Parts")]
+    parts: Option<u32>,
+
     /// Keeps every worker thread on a core of its own
     #[arg(long, help_heading = "Machine")]
     pin: bool,
@@ -69,34 +94,66 @@ pub(super) struct Render {
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
-    let settings = arguments.settings()?;
-    let output = arguments.output()?;
-    let opened = arguments.scene.open(arguments.run.threads, arguments.quiet)?;
-    let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
+    let keep = arguments.keep();
+    let (resumed, told) = arguments.resumed(keep.as_deref())?;
+    let header = resumed.as_ref().map(|resumed| &resumed.header);
+    let settings = arguments.settings(header.map(|header| &header.start.settings))?;
+    let is_part = settings.parts.only.is_some();
+    // a part has nothing to show but what it keeps
+    let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
+    let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part)?;
+    // from now on, also while the scene is read, the signal is no longer the end
+    let asked = keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
+    let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
+    let is_kept = keep.is_some() || resumed.is_some();
+    let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
+    resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
+    let opened = Opened::of(description, settings.threads, arguments.quiet)?;
+    let done = header.map(|header| header.done.clone());
+    let log = arguments.log.as_deref().map(|path| match &done {
+        Some(done) => Log::resume(path, done.mutations, done.elapsed),
+        None => Log::create(path),
+    });
+    let log = log.transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());
-    for warning in &opened.warnings {
+    let arithmetic = resumed.as_ref().map(|resumed| elsewhere(resumed, &opened)).transpose()?.flatten();
+    for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
         progress.say(&format!("warning: {warning}"));
     }
-    let audience = Audience { snapshots: arguments.snapshot.map(Snapshots::every), output: &output, log, progress };
+    let began = done.as_ref().map_or(Duration::ZERO, |done| done.elapsed);
+    let keeper = keep.zip(asked).map(|(path, asked)| Keeper::new(path, asked, arguments.checkpoint, began));
+    let snapshots = arguments.snapshot.map(|interval| Interval::from(began, interval));
+    let audience = Audience { snapshots, keeper, output: &output, log, progress };
 
     let scene_name = arguments.scene.path.display().to_string();
     let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
-    let mut outcome = render::run(&job, &audience).map_err(Failure::running)?;
+    let mut outcome = render::run_from(&job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
     if let Some(fault) = outcome.status.faults.first() {
         let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
         let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
         outcome.warnings.push(format!("the first of those paths: {command}"));
     }
 
-    output.write(&outcome.picture).map_err(Failure::running)?;
+    let mut outputs = Vec::new();
+    if !is_part {
+        output.write(&outcome.picture).map_err(Failure::running)?;
+        outputs = output.files();
+    }
+    let kept = audience.keeper.as_ref().and_then(Keeper::written);
+    if is_part && kept.is_none() {
+        return Err(Failure::running("the part could not be written"));
+    }
+    if let Some(agreement) = &outcome.agreement {
+        audience.progress.say(&agreement.in_words());
+    }
     let failure = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
     audience.finished(&Summary {
         status: outcome.status,
         health: outcome.health,
-        outputs: output.files(),
+        outputs: outputs.into_iter().chain(kept).collect(),
         interrupted: outcome.interrupted,
-        warnings: opened.warnings.iter().cloned().chain(outcome.warnings).collect(),
+        warnings: opened.warnings.iter().cloned().chain(told).chain(outcome.warnings).collect(),
     });
     failure.map_or(Ok(()), Err)
 }
@@ -108,6 +165,25 @@ fn untrusted(health: &Health) -> Option<Failure> {
     (!reasons.is_empty()).then_some(Failure::Exceeded(reasons))
 }
 
+/// A warning where a run is gone on with on a machine that computes otherwise than the one before. Chains that are yet to
+/// start would not find again there what was found here.
+fn elsewhere(resumed: &Resumed, opened: &Opened) -> Result<Option<String>, Failure> {
+    let (before, now) = (&resumed.header.arithmetic, opened.device.arithmetic());
+    if *before == now {
+        return Ok(None);
+    }
+    if resumed.header.chains_are_to_start() {
+        return Err(Failure::input(format_args!(
+            "{}: it was taken before chains started, by {before}; here it is {now}. Go on with it where it began, or begin \
+             anew",
+            resumed.path.display()
+        )));
+    }
+    Ok(Some(format!(
+        "the run was begun by {before} and goes on by {now}: the picture is as good, but last bits may differ"
+    )))
+}
+
 impl Render {
     fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {
@@ -117,21 +193,79 @@ impl Render {
         }
     }
 
-    /// The run that is asked for, or everything that is wrong with it.
-    pub(super) fn settings(&self) -> Result<Settings, Failure> {
-        let settings = Settings { layers: self.layers, pin: self.pin, packet: self.packet, ..self.run.settings() };
-        let mut faults = self.contradictions();
+    /// Where checkpoints go, if there are to be any.
+    fn keep(&self) -> Option<PathBuf> {
+        let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some() || self.part.is_some();
+        let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
+        let beside = || {
+            let of = self.part.and_then(|parts| Some((parts.only?, parts.of)));
+            let extension = of.map_or("checkpoint".into(), |(part, of)| format!("{part}-of-{of}.part"));
+            self.output_name().with_extension(extension)
+        };
+        wanted.then(|| self.checkpoint_file.clone().or(resumed).unwrap_or_else(beside))
+    }
+
+    /// The checkpoint to go on from, with a warning where it is not the last one.
+    fn resumed(&self, keep: Option<&Path>) -> Result<(Option<Resumed>, Option<String>), Failure> {
+        let path = match (&self.resume, keep) {
+            (None, None) => return Ok((None, None)),
+            (None, Some(keep)) if keep.exists() => {
+                return Err(Failure::input(format_args!(
+                    "{}: there is a checkpoint already; go on from it with --resume {}, or delete it to begin anew",
+                    keep.display(),
+                    keep.display()
+                )));
+            }
+            (None, Some(_)) => return Ok((None, None)),
+            (Some(path), None) if path == Path::new(AUTO) => {
+                return Err(Failure::input("--resume auto: give --checkpoint or --checkpoint-file, or name the file"));
+            }
+            (Some(path), Some(keep)) if path == Path::new(AUTO) => {
+                if !keep.exists() && !checkpoint::previous(keep).exists() {
+                    return Ok((None, None));
+                }
+                keep
+            }
+            (Some(path), _) => path,
+        };
+        let (resumed, warning) = checkpoint::open(path).map_err(Failure::input)?;
+        Ok((Some(resumed), warning))
+    }
+
+    /// The run that is asked for, or everything that is wrong with it. What is not given is as `before`, in a checkpoint
+    /// that is gone on with, had it, or as it usually is.
+    pub(super) fn settings(&self, before: Option<&Settings>) -> Result<Settings, Failure> {
+        let base = before.cloned().unwrap_or_default();
+        let settings = Settings {
+            parts: match (self.part, self.parts) {
+                (Some(part), _) => part,
+                (None, Some(of)) => Parts { of, only: None },
+                (None, None) => base.parts,
+            },
+            layers: self.layers || base.layers,
+            pin: self.pin,
+            packet: self.packet,
+            ..self.run.settings(before)
+        };
+        let mut faults = self.contradictions(&settings);
         faults.extend(settings.faults());
         if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
     }
 
     /// What is wrong with the options beside one another, which the settings no longer tell.
-    fn contradictions(&self) -> Vec<String> {
+    fn contradictions(&self, settings: &Settings) -> Vec<String> {
         let mut faults = self.scene.faults();
         if self.quiet && self.verbose {
             faults.push("--quiet and --verbose: give one of them".into());
         }
-        faults.extend(self.run.contradictions(&[("--layers", self.layers), ("--verbose", self.verbose)]));
+        let of_a_ladder = [("--layers", self.layers), ("--verbose", self.verbose)];
+        faults.extend(self.run.contradictions(settings, &of_a_ladder));
+        if self.part.is_some() && self.parts.is_some() {
+            faults.push("--part and --parts: give one of them; one of the parts is run, or all".into());
+        }
+        if settings.parts.only.is_some() && self.snapshot.is_some() {
+            faults.push("--snapshot: a part has no image; relt merge makes one of its file at any time".into());
+        }
         let cores = available_parallelism().map_or(1, usize::from);
         if let Some(threads) = self.run.threads.filter(|threads| self.pin && *threads > cores) {
             faults.push(format!("--pin: {threads} threads cannot have a core each, relt may use {cores}"));
@@ -139,24 +273,41 @@ impl Render {
         faults
     }
 
+    /// The image's name.
+    fn output_name(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| default_output(&self.scene.path))
+    }
+
     /// Where the image goes; all files of the run are known to be writable afterwards.
-    fn output(&self) -> Result<Output, Failure> {
-        let path = self.output.clone().unwrap_or_else(|| default_output(&self.scene.path));
-        let output = Output::new(&path).map_err(Failure::input)?;
-        if let Some(log) = &self.log {
-            let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
-            if output.files().iter().any(|file| place(file) == place(log)) {
-                return Err(Failure::input(format_args!("--log {}: the image goes there", log.display())));
+    fn output(&self, keep: Option<&Path>, goes_on: bool, is_part: bool) -> Result<Output, Failure> {
+        let output = Output::new(&self.output_name()).map_err(Failure::input)?;
+        let place = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
+        let mut taken: Vec<(PathBuf, &str)> =
+            output.files().iter().map(|file| (place(file), "the image goes there")).collect();
+        taken.push((place(&self.scene.path), "that is the scene"));
+        let others = [("--log", self.log.as_deref()), ("--checkpoint-file", keep)];
+        for (option, path) in others.into_iter().filter_map(|(option, path)| Some((option, path?))) {
+            if let Some((_, why)) = taken.iter().find(|(other, _)| *other == place(path)) {
+                return Err(Failure::input(format_args!("{option} {}: {why}", path.display())));
             }
-            if place(log) == place(&self.scene.path) {
-                return Err(Failure::input(format_args!("--log {}: that is the scene", log.display())));
-            }
-            log::check(log).map_err(Failure::input)?;
+            taken.push((place(path), "the log goes there"));
         }
-        output.check().map_err(Failure::input)?;
+        if let Some(log) = &self.log {
+            log::check(log).map_err(Failure::input)?;
+            if goes_on {
+                log::check_resumable(log).map_err(Failure::input)?;
+            }
+        }
+        if !is_part {
+            output.check().map_err(Failure::input)?;
+        }
+        keep.map_or(Ok(()), check_writable).map_err(Failure::input)?;
         Ok(output)
     }
 }
+
+/// What `--resume` says where the checkpoint may not be there yet.
+const AUTO: &str = "auto";
 
 /// The scene's folder's name with `.exr`, in the current folder: scene files are mostly named alike.
 fn default_output(scene: &Path) -> PathBuf {
@@ -171,28 +322,85 @@ fn default_output(scene: &Path) -> PathBuf {
 struct Audience<'a> {
     progress: Progress,
     log: Option<Log>,
-    snapshots: Option<Snapshots>,
+    snapshots: Option<Interval>,
+    keeper: Option<Keeper>,
     output: &'a Output,
 }
 
-/// When the next snapshot is due.
-struct Snapshots {
-    interval: Duration,
+/// When something that happens at an interval is due.
+struct Interval {
+    length: Duration,
     due: Mutex<Duration>,
 }
 
-impl Snapshots {
-    fn every(interval: Duration) -> Snapshots {
-        Snapshots { interval, due: Mutex::new(interval) }
+impl Interval {
+    /// First so long after `begin`.
+    fn from(begin: Duration, length: Duration) -> Interval {
+        Interval { length, due: Mutex::new(begin + length) }
     }
 
     fn is_due(&self, elapsed: Duration) -> bool {
         elapsed >= *self.due.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts from now, so that slow files do not make snapshots follow one another without a pause.
+    /// Counts from now, so that slow files do not follow one another without a pause.
     fn taken(&self, elapsed: Duration) {
-        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = elapsed + self.interval;
+        *self.due.lock().unwrap_or_else(PoisonError::into_inner) = elapsed + self.length;
+    }
+}
+
+/// Who writes checkpoints.
+struct Keeper {
+    path: PathBuf,
+    interval: Option<Interval>,
+    /// A signal asks for one.
+    asked: Arc<AtomicBool>,
+    /// The last one could be written.
+    written: AtomicBool,
+}
+
+impl Keeper {
+    fn new(path: PathBuf, asked: Arc<AtomicBool>, interval: Option<Duration>, begin: Duration) -> Keeper {
+        let interval = interval.map(|interval| Interval::from(begin, interval));
+        Keeper { path, interval, asked, written: AtomicBool::new(false) }
+    }
+
+    fn is_due(&self, elapsed: Duration) -> bool {
+        self.asked.load(Relaxed) || self.interval.as_ref().is_some_and(|interval| interval.is_due(elapsed))
+    }
+
+    /// The file, if it is there.
+    fn written(&self) -> Option<PathBuf> {
+        self.written.load(Relaxed).then(|| self.path.clone())
+    }
+
+    /// Writes a checkpoint, or tells why not: the disk may have room again at the next. Returns whether a signal asked for
+    /// it.
+    fn write(&self, checkpoint: &Checkpoint) -> (bool, Result<(), FileError>) {
+        let asked = self.asked.swap(false, Relaxed);
+        let written = checkpoint.write(&self.path);
+        self.written.store(written.is_ok(), Relaxed);
+        (asked, written)
+    }
+}
+
+impl Audience<'_> {
+    fn keep(&self, checkpoint: &Checkpoint) {
+        let Some(keeper) = &self.keeper else { return };
+        let begin = Instant::now();
+        let (asked, written) = keeper.write(checkpoint);
+        match written {
+            Ok(()) => {
+                self.log.iter().for_each(|log| log.checkpoint(checkpoint.status, &keeper.path, begin.elapsed()));
+                if asked {
+                    self.progress.say(&format!("wrote {}", keeper.path.display()));
+                }
+            }
+            Err(error) => self.progress.say(&format!("warning: no checkpoint: {error}")),
+        }
+        // from its end on, as the run stands still for it
+        let now = checkpoint.status.elapsed + begin.elapsed();
+        keeper.interval.iter().for_each(|interval| interval.taken(now));
     }
 }
 
@@ -225,6 +433,18 @@ impl Observer for Audience<'_> {
         }
     }
 
+    fn wants_checkpoint(&self, status: &Status) -> bool {
+        self.keeper.as_ref().is_some_and(|keeper| keeper.is_due(status.elapsed))
+    }
+
+    fn checkpoint(&self, checkpoint: &Checkpoint) {
+        self.keep(checkpoint);
+    }
+
+    fn ended(&self, checkpoint: &Checkpoint) {
+        self.keep(checkpoint);
+    }
+
     fn finished(&self, summary: &Summary) {
         self.log.iter().for_each(|log| log.finished(summary));
         self.progress.finished(summary);
@@ -249,7 +469,7 @@ mod tests {
 
     fn settings(arguments: &[&str]) -> Result<Settings, String> {
         let arguments = ["relt", "scene.xml"].iter().chain(arguments);
-        Only::try_parse_from(arguments).unwrap().render.settings().map_err(|failure| failure.to_string())
+        Only::try_parse_from(arguments).unwrap().render.settings(None).map_err(|failure| failure.to_string())
     }
 
     #[test]
@@ -260,12 +480,13 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let given = "--method re --betas 0,0.25,1 --combine target --uniform-share 0.25 --error absolute --layers \
-                     --mpp 10 --time 5m --seed 7 --threads 1 --pin";
+                     --mpp 10 --time 5m --seed 7 --part 3/8 --threads 1 --pin";
         let given: Vec<_> = given.split(' ').collect();
         let expected = Settings {
             mapping: MappingChoice::Auto,
             method: Method::ReplicaExchange,
             seed: 7,
+            parts: Parts { of: 8, only: Some(3) },
             threads: Some(1),
             pin: true,
             mutations_per_pixel: Some(10.0),
@@ -326,7 +547,7 @@ mod tests {
 
     #[test]
     fn snapshots_keep_their_distance() {
-        let snapshots = Snapshots::every(Duration::from_secs(10));
+        let snapshots = Interval::from(Duration::ZERO, Duration::from_secs(10));
         assert!(!snapshots.is_due(Duration::from_secs(9)));
         assert!(snapshots.is_due(Duration::from_secs(25)));
         snapshots.taken(Duration::from_secs(25));

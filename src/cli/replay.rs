@@ -82,16 +82,16 @@ pub(super) fn run(arguments: Replay) -> Result<(), Failure> {
 impl Replay {
     /// The run that the evaluation belongs to, or everything that is wrong with it.
     fn settings(&self) -> Result<Settings, Failure> {
-        let settings = self.run.settings();
+        let settings = self.run.settings(None);
         let mut faults = self.scene.faults();
-        faults.extend(self.run.contradictions(&[]));
+        faults.extend(self.run.contradictions(&settings, &[]));
         faults.extend(settings.faults());
-        faults.extend(self.contradictions());
+        faults.extend(self.contradictions(&settings));
         if faults.is_empty() { Ok(settings) } else { Err(Failure::Input(faults)) }
     }
 
     /// What is wrong with the options that name the evaluation.
-    fn contradictions(&self) -> Vec<String> {
+    fn contradictions(&self, settings: &Settings) -> Vec<String> {
         let mut faults = Vec::new();
         let named = [self.pixel.is_some(), self.bootstrap.is_some(), self.chain.is_some()];
         if named.into_iter().filter(|named| *named).count() != 1 {
@@ -118,7 +118,7 @@ impl Replay {
             faults.push("--technique-change: there are none without --technique-changes on".into());
         }
         // a uniform point is the same whatever the run is otherwise
-        if self.chain.is_some() && !self.uniform && self.run.method == Method::Path {
+        if self.chain.is_some() && !self.uniform && settings.method == Method::Path {
             faults.push("--chain: --method path has no chains".into());
         }
         faults

@@ -12,9 +12,9 @@ use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, MltSe
 /// Method, budget, seed and threads.
 #[derive(Args)]
 pub(super) struct RunOptions {
-    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange
-    #[arg(long, default_value = "re", value_parser = values::method(), help_heading = "Method")]
-    pub method: Method,
+    /// path: independent samples; mlt: Metropolis light transport; re: replica exchange [default: re]
+    #[arg(long, value_parser = values::method(), help_heading = "Method")]
+    pub method: Option<Method>,
 
     /// Replicas on a ladder for --method re, 1 to 1024, the uniform one included, placed at equal rejection of swaps;
     /// auto: as many as pay, none but the uniform one where path tracing is best [default: auto]
@@ -23,9 +23,9 @@ pub(super) struct RunOptions {
 
     /// From random numbers to light paths; unidirectional: camera paths; light: light subpaths seen by the camera;
     /// two-way: both; bidirectional: both, and every vertex of one joined to every vertex of the other; multiplexed: one of
-    /// those ways for each mutation; auto: a short trial on the scene decides
-    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = values::mapping(), help_heading = "Method")]
-    pub mapping: MappingChoice,
+    /// those ways for each mutation; auto: a short trial on the scene decides [default: auto]
+    #[arg(long, value_name = "HOW", value_parser = values::mapping(), help_heading = "Method")]
+    pub mapping: Option<MappingChoice>,
 
     /// Lets chains on --mapping multiplexed change the technique of a path and keep the path [default: off]
     #[arg(long, value_name = "WHETHER", value_parser = values::switch(), help_heading = "Method")]
@@ -71,9 +71,9 @@ pub(super) struct RunOptions {
     #[arg(long, value_parser = values::duration, allow_hyphen_values = true, help_heading = "Budget")]
     pub time: Option<Duration>,
 
-    /// Seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Budget")]
-    pub seed: u64,
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
+    pub seed: Option<u64>,
 
     /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
@@ -81,38 +81,43 @@ pub(super) struct RunOptions {
 }
 
 impl RunOptions {
-    /// The run that is asked for; files and what else concerns the machine are left at their defaults.
-    pub fn settings(&self) -> Settings {
-        let no_budget = self.mpp.is_none() && self.time.is_none();
-        let defaults = Settings::default();
+    /// The run that is asked for; files and what else concerns the machine are left at their defaults. What is not given is
+    /// as `before` had it, or as it usually is.
+    pub fn settings(&self, before: Option<&Settings>) -> Settings {
+        let (mutations_per_pixel, time) = match (self.mpp, self.time, before) {
+            (None, None, Some(before)) => (before.mutations_per_pixel, before.time),
+            (None, None, None) => (Some(DEFAULT_MUTATIONS_PER_PIXEL), None),
+            given => (given.0, given.1),
+        };
+        let base = before.cloned().unwrap_or_default();
         Settings {
-            method: self.method,
-            mapping: self.mapping,
-            seed: self.seed,
+            method: self.method.unwrap_or(base.method),
+            mapping: self.mapping.unwrap_or(base.mapping),
+            seed: self.seed.unwrap_or(base.seed),
             threads: self.threads,
-            mutations_per_pixel: if no_budget { Some(DEFAULT_MUTATIONS_PER_PIXEL) } else { self.mpp },
-            time: self.time,
+            mutations_per_pixel,
+            time,
             ladder: match (&self.betas, &self.replicas) {
                 (Some(betas), _) => LadderChoice::Betas(betas.clone()),
                 (None, Some(replicas)) => replicas.clone(),
-                (None, None) => LadderChoice::default(),
+                (None, None) => base.ladder,
             },
-            combine: self.combine.unwrap_or_default(),
-            uniform_share: self.uniform_share,
-            measure: self.error.unwrap_or_default(),
-            technique_changes: self.technique_changes.unwrap_or(defaults.technique_changes),
+            combine: self.combine.unwrap_or(base.combine),
+            uniform_share: self.uniform_share.or(base.uniform_share),
+            measure: self.error.unwrap_or(base.measure),
+            technique_changes: self.technique_changes.unwrap_or(base.technique_changes),
             mlt: MltSettings {
-                large_steps: self.large_steps.unwrap_or(MltSettings::default().large_steps),
-                normalisation: self.normalisation.unwrap_or_default(),
-                kelemen_weights: self.kelemen_weights,
+                large_steps: self.large_steps.unwrap_or(base.mlt.large_steps),
+                normalisation: self.normalisation.unwrap_or(base.mlt.normalisation),
+                kelemen_weights: self.kelemen_weights || base.mlt.kelemen_weights,
             },
-            ..defaults
+            ..Settings::default()
         }
     }
 
-    /// What is wrong with the options beside one another, which the settings no longer tell; `of_a_ladder` are further
+    /// What is wrong with the options beside one another and the settings they came to; `of_a_ladder` are further
     /// options that only a ladder makes sense of, and whether they are given.
-    pub fn contradictions(&self, of_a_ladder: &[(&str, bool)]) -> Vec<String> {
+    pub fn contradictions(&self, settings: &Settings, of_a_ladder: &[(&str, bool)]) -> Vec<String> {
         let mut faults = Vec::new();
         if self.betas.is_some() && self.replicas.is_some() {
             faults.push("--betas and --replicas: give one of them; the number of replicas is that of the betas".into());
@@ -124,13 +129,13 @@ impl RunOptions {
             ("--uniform-share", self.uniform_share.is_some()),
             ("--error", self.error.is_some()),
         ];
-        if self.method != Method::ReplicaExchange {
-            let method = self.method.name();
+        if settings.method != Method::ReplicaExchange {
+            let method = settings.method.name();
             let given = own.iter().chain(of_a_ladder).filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no ladder; only re has")));
         }
-        let multiplexed = self.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
-        if self.technique_changes == Some(true) && !(multiplexed && self.method != Method::Path) {
+        let multiplexed = settings.mapping == MappingChoice::Fixed(MappingKind::Multiplexed);
+        if self.technique_changes == Some(true) && !(multiplexed && settings.method != Method::Path) {
             faults.push(
                 "--technique-changes on: only chains of --method mlt or re on --mapping multiplexed have a technique to change"
                     .into(),
@@ -141,8 +146,8 @@ impl RunOptions {
             ("--normalisation", self.normalisation.is_some()),
             ("--kelemen-weights", self.kelemen_weights),
         ];
-        if self.method != Method::Mlt {
-            let method = self.method.name();
+        if settings.method != Method::Mlt {
+            let method = settings.method.name();
             let given = of_large_steps.iter().filter(|(_, given)| *given);
             faults.extend(given.map(|(name, _)| format!("{name}: --method {method} has no large steps; only mlt has")));
         }

@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP: the first ends a run with the image of what is done, the second ends it at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first ends a run with the image of what is done, the second ends it at once. SIGUSR1
+//! asks for a checkpoint.
 
 use std::process;
 use std::sync::Arc;
@@ -20,4 +21,13 @@ pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     })
     .map_err(|error| Failure::running(format_args!("cannot listen to Ctrl-C: {error}")))?;
     Ok(stop)
+}
+
+/// The flag that SIGUSR1 raises, each time; nothing does on systems that have no such signal.
+pub(super) fn checkpoint_flag() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGUSR1, flag.clone())
+        .map_err(|error| Failure::running(format_args!("cannot listen to SIGUSR1: {error}")))?;
+    Ok(flag)
 }

@@ -96,7 +96,7 @@ fn parse_options(words: &[String]) -> Result<Settings, String> {
         text[..end.unwrap_or(text.len())].trim_start_matches("error: ").trim().to_owned()
     };
     let line = Line::try_parse_from(line).map_err(first)?;
-    line.render.settings().map_err(|failure| failure.to_string().replace("error: ", ""))
+    line.render.settings(None).map_err(|failure| failure.to_string().replace("error: ", ""))
 }
 
 /// All runs that are not finished yet.

@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::embree::Width;
 use crate::path::MappingKind;
-use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, Normalisation, PacketChoice};
+use crate::render::{Combine, LadderChoice, MappingChoice, Measure, Method, Normalisation, PacketChoice, Parts};
 
 /// `name=value`.
 pub(super) fn define(text: &str) -> Result<(String, String), String> {
@@ -54,6 +53,31 @@ pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {
     }
 }
 
+/// `3/8`, or `slurm` for the task of a job array that this process is.
+pub(super) fn part(text: &str) -> Result<Parts, String> {
+    let (only, of) = match text {
+        "slurm" => slurm_task(|name| std::env::var(name).ok())?,
+        _ => {
+            let numbers = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
+            numbers.ok_or("write it as 3/8, for part 3 of 8, or slurm for the task of a job array")?
+        }
+    };
+    Ok(Parts { of, only: Some(only) })
+}
+
+/// Which task of how many this process is: arrays may begin at any number and count in any step.
+fn slurm_task(variable: impl Fn(&str) -> Option<String>) -> Result<(u32, u32), String> {
+    let number = |name: &str| -> Result<u32, String> {
+        let text = variable(name).ok_or_else(|| format!("{name} is not set: this is no task of a job array"))?;
+        text.parse().map_err(|_| format!("{name} is {text:?}, not a number"))
+    };
+    let or = |name: &str, default: u32| if variable(name).is_some() { number(name) } else { Ok(default) };
+    let (task, count) = (number("SLURM_ARRAY_TASK_ID")?, number("SLURM_ARRAY_TASK_COUNT")?);
+    let (first, step) = (or("SLURM_ARRAY_TASK_MIN", 1)?, or("SLURM_ARRAY_TASK_STEP", 1)?.max(1));
+    let place = task.checked_sub(first).filter(|offset| offset.is_multiple_of(step)).map(|offset| offset / step + 1);
+    place.map(|part| (part, count)).ok_or_else(|| format!("task {task} of an array from {first} in steps of {step}"))
+}
+
 pub(super) fn measure() -> impl TypedValueParser<Value = Measure> {
     one_of(&Measure::ALL, |measure| measure.name())
 }
@@ -72,20 +96,7 @@ pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
 }
 
 pub(super) fn packet() -> impl TypedValueParser<Value = PacketChoice> {
-    static ALL: [PacketChoice; 5] = [
-        PacketChoice::Auto,
-        PacketChoice::Fixed(Width::W1),
-        PacketChoice::Fixed(Width::W4),
-        PacketChoice::Fixed(Width::W8),
-        PacketChoice::Fixed(Width::W16),
-    ];
-    one_of(&ALL, |packet| match packet {
-        PacketChoice::Auto => "auto",
-        PacketChoice::Fixed(Width::W1) => "1",
-        PacketChoice::Fixed(Width::W4) => "4",
-        PacketChoice::Fixed(Width::W8) => "8",
-        PacketChoice::Fixed(Width::W16) => "16",
-    })
+    one_of(&PacketChoice::ALL, |packet| packet.name())
 }
 
 /// Exactly the names of `all`, which help and messages list.
@@ -107,6 +118,22 @@ mod tests {
         assert_eq!(define("a=b=c"), Ok(("a".into(), "b=c".into())));
         assert_eq!(define("a="), Ok(("a".into(), String::new())));
         assert!(define("res").is_err() && define("=64").is_err());
+    }
+
+    #[test]
+    fn tasks_of_arrays_are_parts_wherever_arrays_begin() {
+        let of = |variables: &[(&str, &str)]| {
+            slurm_task(|name| variables.iter().find(|(known, _)| known[12..] == name[12..]).map(|(_, v)| v.to_string()))
+        };
+        let [id, count, min, step] = ["ID", "COUNT", "MIN", "STEP"].map(|end| format!("SLURM_ARRAY_TASK_{end}"));
+        assert_eq!(of(&[(&id, "3"), (&count, "8")]), Ok((3, 8)));
+        assert_eq!(of(&[(&id, "0"), (&count, "8"), (&min, "0")]), Ok((1, 8)));
+        assert_eq!(of(&[(&id, "14"), (&count, "3"), (&min, "10"), (&step, "2")]), Ok((3, 3)));
+        assert!(of(&[(&id, "3")]).unwrap_err().contains(&count));
+        assert!(of(&[(&id, "x"), (&count, "8")]).unwrap_err().contains("not a number"));
+        assert!(of(&[(&id, "3"), (&count, "8"), (&min, "2"), (&step, "2")]).is_err());
+        assert_eq!(part("3/8"), Ok(Parts { of: 8, only: Some(3) }));
+        assert!(part("3").is_err() && part("a/b").is_err() && part("-1/3").is_err());
     }
 
     #[test]

@@ -86,6 +86,22 @@ impl Device {
         format!("Embree {} ({}, {})", embree.version, embree.path.display(), embree.origin)
     }
 
+    /// What decides on the last bits of a hit: version, processor family and instruction sets.
+    pub fn arithmetic(&self) -> String {
+        let widths: Vec<String> = self.native_widths().iter().map(Width::to_string).collect();
+        #[cfg(target_arch = "x86_64")]
+        let fused = is_x86_feature_detected!("fma") && is_x86_feature_detected!("avx2");
+        #[cfg(not(target_arch = "x86_64"))]
+        let fused = false;
+        format!(
+            "Embree {}, {}{}, packets of {}",
+            self.0.embree.version,
+            std::env::consts::ARCH,
+            if fused { " with AVX2" } else { "" },
+            widths.join(", ")
+        )
+    }
+
     pub(super) fn embree(&self) -> &'static Embree {
         self.0.embree
     }

@@ -9,8 +9,11 @@
 //! thread is working on is left for later, so threads rarely wait.
 
 use std::hint::black_box;
+use std::io::{self, Write};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+
+use crate::saved::{Source, Unfit, expect};
 
 /// One contribution to one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -260,6 +263,51 @@ impl Accumulator {
         self.layers[layer].iter().for_each(|band| locked(band).fill(Cell::default()));
     }
 
+    /// Writes all sums, exactly: number of layers, pixels and splats beyond the range, unit, then the sums layer by layer,
+    /// each as short as it may be.
+    pub fn save(&self, out: &mut dyn Write) -> io::Result<()> {
+        for number in [self.layers.len() as u64, self.pixels as u64, self.overflowed(), self.rgb.exponent as u64] {
+            out.write_all(&number.to_le_bytes())?;
+        }
+        let mut bytes = Vec::new();
+        for band in self.layers.iter().flatten() {
+            bytes.clear();
+            locked(band).iter().flat_map(|Cell(sums)| sums).for_each(|sum| encode(*sum, &mut bytes));
+            out.write_all(&(bytes.len() as u64).to_le_bytes())?;
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the sums that [`save`](Self::save) wrote, of an accumulator of the same shape and unit.
+    pub fn restore(&mut self, from: &mut Source) -> Result<(), Unfit> {
+        let found = [from.number()?, from.number()?, from.number()?, from.number()?];
+        let expected = [self.layers.len() as u64, self.pixels as u64, found[2], self.rgb.exponent as u64];
+        expect(found == expected, "film")?;
+        self.overflowed = AtomicU64::new(found[2]);
+        let mut bytes = Vec::new();
+        for band in self.layers.iter_mut().flatten() {
+            let cells = band.get_mut().unwrap_or_else(PoisonError::into_inner);
+            let length = from.number()?;
+            let most = (cells.len() * size_of::<Cell>()) as u64 * 17 / 16; // with the first byte of each sum
+            expect(length <= most, "film")?;
+            bytes.resize(length as usize, 0);
+            from.fill(&mut bytes)?;
+            let mut rest = &bytes[..];
+            for sum in cells.iter_mut().flat_map(|Cell(sums)| sums) {
+                *sum = decode(&mut rest).ok_or_else(|| Unfit::damaged("its film ends too early"))?;
+            }
+            expect(rest.is_empty(), "film")?;
+        }
+        Ok(())
+    }
+
+    /// Bytes that [`save`](Self::save) writes at the least for a film of that shape: what a file that claims to hold one must
+    /// have before memory is taken for it.
+    pub fn fewest_bytes(pixels: u64, layers: u64) -> u64 {
+        pixels.saturating_mul(layers).saturating_mul(4)
+    }
+
     /// Adds another accumulator's sums; it must have the same shape and unit.
     pub fn merge(&self, other: &Accumulator) {
         assert_eq!((self.pixels, self.layers.len(), self.rgb), (other.pixels, other.layers.len(), other.rgb));
@@ -286,6 +334,44 @@ fn saturate(sums: &mut [i128; 4], values: [i128; 4]) {
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum = sum.wrapping_sub(value).saturating_add(value);
     }
+}
+
+/// A first byte of this means that all sixteen follow.
+const ALL_BYTES: u8 = 0xFF;
+
+/// Appends an integer without the bytes that tell nothing: those of the sign at its upper end, and zeros at its lower
+/// one, where splats of the usual size leave a third of the bits empty. A first byte has the number of such zeros in its
+/// upper half and the number of bytes that are kept in its lower one. A sum takes 6 to 8 bytes in the place of 16.
+fn encode(sum: i128, bytes: &mut Vec<u8>) {
+    let zeros = if sum == 0 { 0 } else { sum.trailing_zeros() / 8 };
+    let rest = sum >> (8 * zeros);
+    let bits = 1 + i128::BITS - (if rest < 0 { !rest } else { rest }).leading_zeros(); // one of them the sign
+    let kept = if sum == 0 { 0 } else { bits.div_ceil(8) };
+    if kept > 15 {
+        bytes.push(ALL_BYTES);
+        bytes.extend(sum.to_le_bytes());
+    } else {
+        bytes.push((zeros << 4 | kept) as u8);
+        bytes.extend(&rest.to_le_bytes()[..kept as usize]);
+    }
+}
+
+/// Takes an integer that [`encode`] appended off the front; nothing where it is cut off or nonsense.
+fn decode(bytes: &mut &[u8]) -> Option<i128> {
+    let (&first, rest) = bytes.split_first()?;
+    if first == ALL_BYTES {
+        let (sum, rest) = rest.split_first_chunk()?;
+        *bytes = rest;
+        return Some(i128::from_le_bytes(*sum));
+    }
+    let (zeros, kept) = (u32::from(first >> 4), usize::from(first & 15));
+    let (found, rest) = rest.split_at_checked(kept)?;
+    let sign = found.last().map_or(0, |last| if last & 0x80 == 0 { 0 } else { 0xFF });
+    let mut all = [sign; 16];
+    all[..kept].copy_from_slice(found);
+    *bytes = rest;
+    let value = i128::from_le_bytes(all);
+    (value << (8 * zeros) >> (8 * zeros) == value).then_some(value << (8 * zeros))
 }
 
 /// The least e with 2^e ≥ `unit`, kept to where `f32` values are; 0 for 0.
@@ -428,6 +514,55 @@ mod tests {
         assert_eq!(sums[1], [full, 0.0, 3.0, 3.0]);
         assert_eq!(sums[0], [full, 1.0, 1.0, 1.0]);
         assert_eq!(film.overflowed(), 3);
+    }
+
+    #[test]
+    fn every_integer_is_encoded_and_decoded() {
+        let mut values = vec![0, 1, -1, i128::MAX, i128::MIN, 0x80, -0x80, 0xFF, 0x7F00, -0x100];
+        for shift in 0..127 {
+            for bits in [1i128, 0x55, 0x8000_0001, 0x0123_4567_89AB_CDEF] {
+                values.extend([bits << shift, -(bits << shift), (bits << shift) - 1]);
+            }
+        }
+        let mut bytes = Vec::new();
+        values.iter().for_each(|value| encode(*value, &mut bytes));
+        let mut rest = &bytes[..];
+        for value in &values {
+            assert_eq!(decode(&mut rest), Some(*value), "{value:#x}");
+        }
+        assert!(rest.is_empty());
+        for length in 0..17 {
+            let mut all = vec![ALL_BYTES];
+            all.extend([1; 16]);
+            assert_eq!(decode(&mut &all[..length]), None, "{length} of 17 bytes");
+        }
+    }
+
+    #[test]
+    fn a_saved_film_is_the_film_and_fits_no_other() {
+        let mut splats = Splats::new(2);
+        for i in 0..1000u32 {
+            let rgb = [i as f32 * 0.1, -1e-9, f32::MAX];
+            splats.push((i % 2) as usize, Splat { pixel: i * 7 % 150, rgb, weight: 0.7 });
+        }
+        let film = Accumulator::new(50, 3, 2, 4.0);
+        film.deposit(&mut splats);
+        let mut bytes = Vec::new();
+        film.save(&mut bytes).unwrap();
+        let restore = |film: &mut Accumulator, bytes: &[u8]| film.restore(&mut Source::new(bytes, bytes.len() as u64));
+        let mut back = Accumulator::new(50, 3, 2, 4.0);
+        restore(&mut back, &bytes).unwrap();
+        assert_eq!((film.layer(0), film.layer(1)), (back.layer(0), back.layer(1)));
+        assert_eq!(film.overflowed(), back.overflowed());
+        assert!(bytes.len() as u64 >= Accumulator::fewest_bytes(150, 2));
+        for mut other in
+            [Accumulator::new(50, 3, 1, 4.0), Accumulator::new(5, 3, 2, 4.0), Accumulator::new(50, 3, 2, 8.0)]
+        {
+            assert!(restore(&mut other, &bytes).is_err());
+        }
+        for length in (0..bytes.len()).step_by(101) {
+            assert!(restore(&mut back, &bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
+        }
     }
 
     #[test]

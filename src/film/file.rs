@@ -56,12 +56,43 @@ pub fn write_whole(
     Ok(())
 }
 
+/// As [`write_whole`], for files that are long in the writing, and written again and again: the one that was there is kept
+/// as `previous`, and what a killed process left half written is gone with the next one instead of adding up.
+pub fn write_whole_and_keep(
+    path: &Path,
+    previous: &Path,
+    content: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let failed = |error: &io::Error| FileError::write(path, plain(error));
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".unfinished");
+    let _ = std::fs::remove_file(path.with_file_name(&name)); // mostly it is not there
+    let mut builder = Builder::new();
+    builder.prefix(&name).rand_bytes(0);
+    let mut temporary = create_named(path, &mut builder)?;
+    let mut writer = BufWriter::with_capacity(1 << 20, temporary.as_file_mut());
+    content(&mut writer).and_then(|()| writer.flush()).map_err(|error| failed(&error))?;
+    drop(writer);
+    temporary.as_file().sync_all().map_err(|error| failed(&error))?;
+    match std::fs::rename(path, previous) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(FileError::write(previous, plain(&error))),
+        _ => {}
+    }
+    temporary.persist(path).map_err(|error| failed(&error.error))?;
+    Ok(())
+}
+
 /// Finds out now whether [`write_whole`] will be able to write `path`; leaves nothing behind.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     create_beside(path).map(drop)
 }
 
 fn create_beside(path: &Path) -> Result<NamedTempFile, FileError> {
+    create_named(path, Builder::new().prefix(".relt-").suffix(".tmp"))
+}
+
+/// A temporary file in the folder of `path`, of the name that the builder is set to.
+fn create_named(path: &Path, builder: &mut Builder) -> Result<NamedTempFile, FileError> {
     if path.is_dir() {
         return Err(FileError::write(path, "it is a folder"));
     }
@@ -69,8 +100,6 @@ fn create_beside(path: &Path) -> Result<NamedTempFile, FileError> {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
-    let mut builder = Builder::new();
-    builder.prefix(".relt-").suffix(".tmp");
     #[cfg(unix)]
     {
         // A temporary file is its owner's alone by default; what it becomes should be as any other file.

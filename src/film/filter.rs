@@ -1,7 +1,9 @@
 //! Reconstruction filters, and the pixels that one sample reaches.
 
+use serde::{Deserialize, Serialize};
+
 /// How a sample on the film spreads over pixels; all separable, lengths in pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Filter {
     /// Constant over the pixel that the sample falls into.
     Box,

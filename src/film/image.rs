@@ -1,5 +1,7 @@
 //! Images in memory.
 
+use serde::{Deserialize, Serialize};
+
 /// The paper's luminance of linear RGB; also what the scalar contribution g is made with.
 pub const LUMINANCE: [f32; 3] = [0.299, 0.587, 0.114];
 
@@ -24,7 +26,7 @@ pub enum Plane {
 }
 
 /// What a pixel holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PixelFormat {
     /// Red, green and blue.
     #[default]
@@ -34,7 +36,7 @@ pub enum PixelFormat {
 }
 
 /// Where an image lies in a larger one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// Width and height in pixels of the whole.
     pub whole: [u32; 2],

@@ -1,5 +1,7 @@
 //! What a point contributes to the image, and the scalar that chains follow.
 
+use serde::{Deserialize, Serialize};
+
 use super::faults::{Cause, Causes, Faults};
 use crate::scene::Rgb;
 
@@ -11,7 +13,7 @@ pub fn luminance(rgb: Rgb) -> f32 {
 }
 
 /// The contribution of one point of the cube, but for what it gives to the film elsewhere ([`Elsewhere`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contribution {
     /// Position on the film, as fractions of its width and height.
     pub film: [f32; 2],
@@ -97,7 +99,7 @@ fn settled(rgb: Rgb, causes: &mut Causes) -> Rgb {
 }
 
 /// What a point adds to one place of the film.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FilmSplat {
     /// Position on the film, as fractions of its width and height.
     pub film: [f32; 2],
@@ -148,7 +150,7 @@ impl Outcome {
 /// Lists by lane; lanes of mappings that have no such thing cost nothing.
 ///
 /// Memory is as large as the longest list asks for and then stays, so a batch that is warm allocates nothing.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Lists<T> {
     /// Items that a lane has room for.
     room: usize,
@@ -159,6 +161,12 @@ pub struct Lists<T> {
 }
 
 impl<T: Copy + Default> Lists<T> {
+    /// Whether it is for so many lanes and its lists lie where they should.
+    pub fn fits(&self, lanes: usize) -> bool {
+        let within = self.counts.iter().all(|count| usize::from(*count) <= self.room);
+        self.counts.len() == lanes && within && self.room.checked_mul(lanes) == Some(self.items.len())
+    }
+
     /// Nothing, for `lanes` lanes.
     pub fn new(lanes: usize) -> Lists<T> {
         Lists { room: 0, counts: vec![0; lanes], items: Vec::new() }

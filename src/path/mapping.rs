@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Causes, Contribution, Contributions, Elsewhere, Evaluation, Event, Layout, Narration, Origin, RecordedRays, Widths,
@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// How points of the cube become light paths.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MappingKind {
     /// Camera paths with next-event estimation.

@@ -2,19 +2,23 @@
 //! from states resampled among them in proportion to g; image = c/N Σ f/g. Settings let large steps help with c and
 //! with the image.
 
+use std::io::{self, Write};
+
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    engine::{Counts, Development, Diagnostics, Engine, Phase, Stage, film_warnings, mean},
+    engine::{Counts, Development, Diagnostics, Engine, Phase, Sheet, Stage, film_warnings, mean},
     health::ChainReport,
     settings::{MltSettings, Normalisation},
 };
 use crate::{
-    chain::{Baseline, Evaluator, LargeSteps, Plan, Start, baseline_layer, resample},
-    film::{Accumulator, Plane, Splats},
+    chain::{Baseline, Evaluator, LargeSteps, Plan, SavedBaseline, Start, baseline_layer, resample},
+    film::{Accumulator, Footprint, Plane, Splats},
     path::{Faults, Workspace},
-    rng::{Counter, Purpose},
+    rng::{Counter, Purpose, Rng},
     sample::{Move, Points},
+    saved::{Source, Unfit, expect, write_value},
     tempering::{Estimate, split_r_hat},
 };
 
@@ -27,6 +31,8 @@ const BOOTSTRAP_BATCHES: u64 = 16;
 
 /// The method at work.
 pub struct Mlt {
+    sheet: Sheet,
+    footprint: Footprint,
     plan: Plan,
     film: Accumulator,
     blocks: Vec<Block>,
@@ -48,29 +54,31 @@ struct Block {
 
 impl Mlt {
     /// Does the first pass and puts the chains into their first states.
-    pub fn new(stage: &Stage, settings: &MltSettings, mutations: Option<u64>) -> Mlt {
-        let bootstrap_samples = mutations.map_or(BOOTSTRAP, |n| BOOTSTRAP.min(n / 2).max(1));
-        let plan = Plan::new(mutations.map(|n| n.saturating_sub(bootstrap_samples).max(1)), 1);
-        let large_steps = LargeSteps { probability: settings.large_steps, kelemen_weights: settings.kelemen_weights };
-        let batches = first_pass(stage, bootstrap_samples);
+    pub fn new(stage: &Stage, rng: Rng, settings: &MltSettings, mutations: Option<u64>) -> Mlt {
+        let (bootstrap_samples, plan) = plan(mutations);
+        let large_steps = large_steps(settings);
+        let sheet = stage.sheet();
+        let batches = first_pass(stage, rng, bootstrap_samples);
         let bootstrap: Vec<(f64, f64)> =
             batches.iter().map(|b| (b.ln_g.iter().map(|l| libm::exp(*l)).sum(), b.ln_g.len() as f64)).collect();
         let samples: Vec<Start> = batches.iter().flat_map(|b| &b.ln_g).enumerate().map(bootstrap_sample).collect();
         let mut bootstrap_faults = Faults::default();
         batches.iter().for_each(|batch| bootstrap_faults.merge(&batch.faults));
         // a black scene has no state to start from: no chains, a black image
-        let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), stage.rng, 0);
+        let starts = resample(&samples, 1.0, plan.blocks * plan.lanes(), rng, 0);
         let blocks = starts
             .par_chunks(plan.lanes())
             .enumerate()
             .map(|(i, starts)| Block {
-                chains: Baseline::new(&stage.mapping, stage.rng, (i * plan.lanes()) as u32, starts, large_steps),
+                chains: Baseline::new(&stage.mapping, rng, (i * plan.lanes()) as u32, starts, large_steps),
                 splats: Splats::new(large_steps.layers()),
             })
             .collect();
         Mlt {
+            sheet,
+            footprint: sheet.footprint(),
             plan,
-            film: stage.accumulator(large_steps.layers()),
+            film: sheet.accumulator(large_steps.layers()),
             blocks,
             large_steps,
             pools: settings.normalisation == Normalisation::Pooled,
@@ -80,6 +88,44 @@ impl Mlt {
             first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
         }
+    }
+
+    /// As it was saved, with the settings and the number of mutations that it was planned for.
+    pub fn restored(
+        sheet: &Sheet,
+        rng: Rng,
+        settings: &MltSettings,
+        planned: Option<u64>,
+        from: &mut Source,
+    ) -> Result<Mlt, Unfit> {
+        let (bootstrap_samples, plan) = plan(planned);
+        let large_steps = large_steps(settings);
+        expect(Accumulator::fewest_bytes(sheet.pixels(), large_steps.layers() as u64) <= from.left(), "film")?;
+        let SavedMlt { bootstrap, bootstrap_rays, bootstrap_faults, blocks } = from.value()?;
+        expect(blocks == 0 || blocks == plan.blocks, "chains")?;
+        let block = |i: usize| {
+            let saved: SavedBaseline = from.value()?;
+            let first = (i * plan.lanes()) as u32;
+            let chains = Baseline::restored(rng, first, plan.lanes(), saved, large_steps)?;
+            Ok(Block { chains, splats: Splats::new(large_steps.layers()) })
+        };
+        let blocks = (0..blocks).map(block).collect::<Result<Vec<_>, Unfit>>()?;
+        let mut film = sheet.accumulator(large_steps.layers());
+        film.restore(from)?;
+        Ok(Mlt {
+            sheet: *sheet,
+            footprint: sheet.footprint(),
+            plan,
+            film,
+            blocks,
+            large_steps,
+            pools: settings.normalisation == Normalisation::Pooled,
+            bootstrap_samples,
+            bootstrap_rays,
+            bootstrap_faults,
+            first_estimate: Estimate::from_sums(&bootstrap),
+            bootstrap,
+        })
     }
 
     /// The magnitude that states are kept in on the film: c as it is known before any step.
@@ -122,6 +168,26 @@ impl Mlt {
     }
 }
 
+/// Samples of the first pass, and how the rest is cut up.
+fn plan(mutations: Option<u64>) -> (u64, Plan) {
+    let bootstrap_samples = mutations.map_or(BOOTSTRAP, |n| BOOTSTRAP.min(n / 2).max(1));
+    (bootstrap_samples, Plan::new(mutations.map(|n| n.saturating_sub(bootstrap_samples).max(1)), 1))
+}
+
+fn large_steps(settings: &MltSettings) -> LargeSteps {
+    LargeSteps { probability: settings.large_steps, kelemen_weights: settings.kelemen_weights }
+}
+
+/// All of [`Mlt`] but for its blocks and its film, and for what follows from settings.
+#[derive(Serialize, Deserialize)]
+struct SavedMlt {
+    bootstrap: Vec<(f64, f64)>,
+    bootstrap_rays: u64,
+    bootstrap_faults: Faults,
+    /// Number of blocks that follow; none where no light was found.
+    blocks: usize,
+}
+
 /// What one batch of the first pass found.
 struct Batch {
     ln_g: Vec<f64>,
@@ -137,14 +203,14 @@ fn bootstrap_sample((sample, ln_g): (usize, &f64)) -> Start {
     Start { counter: bootstrap_counter(sample as u64), ln_g: *ln_g }
 }
 
-fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
+fn first_pass(stage: &Stage, rng: Rng, samples: u64) -> Vec<Batch> {
     let size = BOOTSTRAP_BATCH.min(samples.div_ceil(BOOTSTRAP_BATCHES));
     (0..samples.div_ceil(size))
         .into_par_iter()
         .map(|batch| {
             let samples = batch * size..((batch + 1) * size).min(samples);
             let counters: Vec<Counter> = samples.map(bootstrap_counter).collect();
-            let mut evaluator = Evaluator::<Workspace>::new(stage.rng, counters);
+            let mut evaluator = Evaluator::<Workspace>::new(rng, counters);
             evaluator.moves.fill(Move::Fresh);
             evaluator.evaluate(&stage.mapping, &Points::new(0));
             let out = evaluator.out;
@@ -156,13 +222,16 @@ fn first_pass(stage: &Stage, samples: u64) -> Vec<Batch> {
 impl Engine for Mlt {
     fn sweeps_left(&self) -> Option<u64> {
         match self.blocks.first() {
-            Some(block) => self.plan.sweeps.map(|sweeps| sweeps - block.chains.steps()),
+            Some(block) => self.plan.sweeps.map(|sweeps| sweeps.saturating_sub(block.chains.steps())),
             None => Some(0),
         }
     }
 
     fn mutations_wanted(&self) -> Option<u64> {
-        let sweeps = if self.blocks.is_empty() { Some(0) } else { self.plan.sweeps };
+        let sweeps = match self.blocks.first() {
+            Some(block) => self.plan.sweeps.map(|sweeps| sweeps.max(block.chains.steps())),
+            None => Some(0),
+        };
         sweeps.map(|s| s * self.plan.a_sweep() + self.bootstrap_samples)
     }
 
@@ -206,10 +275,11 @@ impl Engine for Mlt {
     }
 
     /// Image = pixels/N · (ĉ/ζ Σ CHAINS + Σ LARGE_STEPS) with ζ the first estimate of c.
-    fn develop(&self, stage: &Stage) -> Development {
+    fn develop(&self) -> Development {
         let mut splats = Splats::new(self.large_steps.layers());
         for block in &self.blocks {
-            block.chains.record_pending(self.unit(), &mut stage.recorder(&mut splats));
+            let mut recorder = self.sheet.recorder(&self.footprint, &mut splats);
+            block.chains.record_pending(self.unit(), &mut recorder);
         }
         let mut sums = self.film.layer_with(baseline_layer::CHAINS, &splats);
         let normalisation = self.normalisation();
@@ -222,13 +292,30 @@ impl Engine for Mlt {
             sums.iter_mut().flatten().zip(proposals.iter().flatten()).for_each(|(sum, value)| *sum += value);
         }
         let steps: u64 = self.blocks.iter().map(|b| b.chains.mutations()).sum();
-        let scale = if steps > 0 { stage.pixels() as f64 / steps as f64 } else { 0.0 };
+        let scale = if steps > 0 { self.sheet.pixels() as f64 / steps as f64 } else { 0.0 };
         Development {
-            image: stage.image(|i| [0, 1, 2].map(|channel| sums[i][channel] * scale)),
+            image: self.sheet.image(|i| [0, 1, 2].map(|channel| sums[i][channel] * scale)),
             layers: vec![("density".into(), Plane::Gray(sums.iter().map(|s| s[3] as f32).collect()))],
             normalisation: Some(normalisation),
             warnings: film_warnings(&self.film),
             diagnostics: Diagnostics { chains: self.report(), ..Diagnostics::default() },
+            agreement: None,
         }
+    }
+    fn set_wanted(&mut self, mutations: Option<u64>) {
+        let steps = mutations.map(|n| n.saturating_sub(self.bootstrap_samples).max(1));
+        self.plan.sweeps = steps.map(|steps| steps.div_ceil(self.plan.a_sweep()));
+    }
+
+    fn save(&self, out: &mut dyn Write) -> io::Result<()> {
+        let state = SavedMlt {
+            bootstrap: self.bootstrap.clone(),
+            bootstrap_rays: self.bootstrap_rays,
+            bootstrap_faults: self.bootstrap_faults.clone(),
+            blocks: self.blocks.len(),
+        };
+        write_value(out, &state)?;
+        self.blocks.iter().try_for_each(|block| write_value(out, &block.chains.saved()))?;
+        self.film.save(out)
     }
 }

@@ -6,6 +6,9 @@ use std::time::{Duration, Instant};
 pub struct Clock {
     begin: Instant,
     cpu_begin: Option<Duration>,
+    /// Times of earlier processes.
+    before: Duration,
+    cpu_before: Option<Duration>,
     paused: Duration,
     cpu_paused: Duration,
 }
@@ -13,17 +16,29 @@ pub struct Clock {
 impl Clock {
     /// Begins now.
     pub fn start() -> Clock {
-        Clock { begin: Instant::now(), cpu_begin: cpu_time(), paused: Duration::ZERO, cpu_paused: Duration::ZERO }
+        Clock {
+            begin: Instant::now(),
+            cpu_begin: cpu_time(),
+            before: Duration::ZERO,
+            cpu_before: Some(Duration::ZERO),
+            paused: Duration::ZERO,
+            cpu_paused: Duration::ZERO,
+        }
+    }
+
+    /// Goes on from now where another process, after such wall and processor times, left off.
+    pub fn going_on(elapsed: Duration, cpu: Option<Duration>) -> Clock {
+        Clock { before: elapsed, cpu_before: cpu, ..Clock::start() }
     }
 
     /// Wall time.
     pub fn elapsed(&self) -> Duration {
-        self.begin.elapsed().saturating_sub(self.paused)
+        self.before + self.begin.elapsed().saturating_sub(self.paused)
     }
 
     /// Processor time of the whole process, all threads; `None` where the system does not tell.
     pub fn cpu(&self) -> Option<Duration> {
-        Some(cpu_time()?.saturating_sub(self.cpu_begin?).saturating_sub(self.cpu_paused))
+        Some(self.cpu_before? + cpu_time()?.saturating_sub(self.cpu_begin?).saturating_sub(self.cpu_paused))
     }
 
     /// Does something that counts as no time of the run.

@@ -1,11 +1,17 @@
 //! What the render loop asks of a method.
 
+use std::io::{self, Write};
+
+use serde::{Deserialize, Serialize};
+
+use super::parts::Agreement;
 use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
-    path::{Faults, Mapping},
+    path::{Faults, Mapping, Workspace},
     rng::Rng,
-    tempering::{Estimate, RoundReport},
+    scene::description::FilmDescription,
+    tempering::{Estimate, RoundReport, Sampler},
 };
 
 use super::health::ChainReport;
@@ -22,10 +28,46 @@ pub struct Stage<'s> {
 }
 
 impl Stage<'_> {
+    /// What is recorded to.
+    pub fn sheet(&self) -> Sheet {
+        let scene = self.mapping.scene();
+        Sheet {
+            film: scene.film,
+            brightest: f64::from(scene.emitters.brightest()),
+            elsewhere: crate::chain::Target::splats_elsewhere(&self.mapping),
+            outcomes: self.mapping.has_outcomes(),
+        }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> u64 {
+        self.sheet().pixels()
+    }
+
+    /// A recorder into `splats`.
+    pub fn recorder<'a>(&'a self, splats: &'a mut Splats) -> Recorder<'a> {
+        self.sheet().recorder(&self.footprint, splats)
+    }
+}
+
+/// All that sums on the film depend on of the scene and the mapping that they are of: what it takes to make a picture of
+/// saved ones.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sheet {
+    /// The film.
+    pub film: FilmDescription,
+    /// Typical magnitude of the brightest f.
+    pub brightest: f64,
+    /// Whether points may contribute elsewhere than at their own film positions.
+    pub elsewhere: bool,
+    /// Whether points choose among outcomes that can be had all at once.
+    pub outcomes: bool,
+}
+
+impl Sheet {
     /// Width and height of the film in pixels.
     pub fn size(&self) -> [u32; 2] {
-        let film = &self.mapping.scene().film;
-        [film.width, film.height]
+        [self.film.width, self.film.height]
     }
 
     /// Number of pixels.
@@ -34,16 +76,20 @@ impl Stage<'_> {
         u64::from(width) * u64::from(height)
     }
 
-    /// A recorder into `splats`.
-    pub fn recorder<'a>(&'a self, splats: &'a mut Splats) -> Recorder<'a> {
-        let size = self.size().map(|n| n as f32);
-        Recorder { footprint: &self.footprint, size, splats }
+    /// From film positions to pixels.
+    pub fn footprint(&self) -> Footprint {
+        Footprint::new(self.film.filter, self.film.width, self.film.height)
     }
 
-    /// An accumulator for the scene's film.
+    /// A recorder into `splats`.
+    pub fn recorder<'a>(&self, footprint: &'a Footprint, splats: &'a mut Splats) -> Recorder<'a> {
+        Recorder { footprint, size: self.size().map(|n| n as f32), splats }
+    }
+
+    /// An accumulator for the film.
     pub fn accumulator(&self, layers: usize) -> Accumulator {
         let [width, height] = self.size();
-        Accumulator::new(width, height, layers, f64::from(self.mapping.scene().emitters.brightest()))
+        Accumulator::new(width, height, layers, self.brightest)
     }
 
     /// An image of f64 colours, each divided and scaled by the caller already.
@@ -64,6 +110,8 @@ pub struct Development {
     pub normalisation: Option<Estimate>,
     /// What the person should know about the picture, one sentence each.
     pub warnings: Vec<String>,
+    /// Whether the parts that it is made of tell the same, where there are several.
+    pub agreement: Option<Agreement>,
     /// What the run is judged by.
     pub diagnostics: Diagnostics,
 }
@@ -112,7 +160,17 @@ pub trait Engine: Send {
     /// Counts so far.
     fn counts(&self) -> Counts;
     /// The picture so far; changes nothing.
-    fn develop(&self, stage: &Stage) -> Development;
+    fn develop(&self) -> Development;
+    /// Changes how many evaluations the whole run takes; how it goes about them stays as it was planned.
+    fn set_wanted(&mut self, mutations: Option<u64>);
+    /// Writes all that it takes to go on from here: see [`restored`](super::run::restored). Reports that nobody has taken
+    /// yet are not kept.
+    fn save(&self, out: &mut dyn Write) -> io::Result<()>;
+    /// The sampler of a path tracer, whose sums may be added to those of others of the same job; nothing for methods whose sums
+    /// mean something to themselves only.
+    fn points(&self) -> Option<&Sampler<Workspace>> {
+        None
+    }
     /// Reports of the rounds that ended since this was last called, in order; none where there are no rounds.
     fn take_reports(&mut self) -> Vec<RoundReport> {
         Vec::new()

@@ -1,7 +1,8 @@
 //! The run log: one JSON object a line, each with its `event`.
 //!
 //! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `round` what a
-//! round of replica exchange came to ([`RoundReport`]); `run_end` the same as a snapshot at the end, with the files
+//! round of replica exchange came to ([`RoundReport`]); `checkpoint` that one was written, `run_resume` that another process
+//! goes on with it; `run_end` the same as a snapshot at the end, with the files
 //! written, the warnings, and whether the run can be trusted ([`Health`]). Times are seconds, rates are probabilities. A line is on its way to
 //! the disk once its event is over, so the log of a run that was killed is complete up to then.
 
@@ -13,13 +14,14 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::health::Health;
 use super::output::Picture;
+use super::settings::Settings;
 use super::status::{Observer, RunStart, Status, Summary};
 use crate::chain::TechniqueChanges;
-use crate::film::file::{FileError, check_writable};
+use crate::film::file::{FileError, check_writable, write_whole};
 use crate::tempering::RoundReport;
 
 /// Finds out now whether a log can be written to `path`; leaves it as it is.
@@ -34,6 +36,36 @@ pub fn check(path: &Path) -> Result<(), FileError> {
     }
 }
 
+/// Finds out now whether the log at `path` can be gone on with; a run's log is there or there is none.
+pub fn check_resumable(path: &Path) -> Result<(), FileError> {
+    before(path, u64::MAX).map(drop)
+}
+
+/// The lines of a log but for those of moments after so many mutations, that of a run's end, and a last one that is cut
+/// off; nothing where there is no log.
+fn before(path: &Path, mutations: u64) -> Result<Vec<u8>, FileError> {
+    /// What tells whether a line stays.
+    #[derive(Deserialize)]
+    struct Head {
+        event: String,
+        #[serde(default)]
+        mutations: u64,
+    }
+    let text = match std::fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        text => text.map_err(|error| FileError::read(path, error))?,
+    };
+    let mut kept = Vec::new();
+    for line in text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n")) {
+        let head: Head = serde_json::from_slice(line)
+            .map_err(|_| FileError::write(path, "it is no log of relt, and --resume would go on in it"))?;
+        if head.mutations <= mutations && head.event != "run_end" {
+            kept.extend(line);
+        }
+    }
+    Ok(kept)
+}
+
 /// Writes the log.
 pub struct Log {
     state: Mutex<State>,
@@ -45,6 +77,8 @@ struct State {
     due: Duration,
     /// The wall time that was last heard of.
     elapsed: Duration,
+    /// The run's beginning is in the log already.
+    goes_on: bool,
     /// The first failure; nothing is written after it.
     failed: Option<io::Error>,
 }
@@ -59,9 +93,36 @@ impl Log {
         File::create(path).map(Log::new).map_err(|error| FileError::write(path, error))
     }
 
+    /// Goes on in the log of a run that is gone on with from a checkpoint after so many mutations. What the log has of later
+    /// moments is dropped, as they come again; a last line that was cut off as well.
+    pub fn resume(path: &Path, mutations: u64, elapsed: Duration) -> Result<Log, FileError> {
+        let kept = before(path, mutations)?;
+        write_whole(path, |file| file.write_all(&kept).map_err(|error| error.to_string()))?;
+        let file = OpenOptions::new().append(true).open(path).map_err(|error| FileError::write(path, error))?;
+        let log = Log::new(file);
+        {
+            let mut state = log.state();
+            (state.due, state.elapsed, state.goes_on) = (elapsed + SHORTEST_GAP, elapsed, !kept.is_empty());
+        }
+        Ok(log)
+    }
+
+    /// A checkpoint was written, which took so long.
+    pub fn checkpoint(&self, status: &Status, path: &Path, took: Duration) {
+        let bytes = path.metadata().map_or(0, |file| file.len());
+        self.state().line(&Event::Checkpoint {
+            seconds: status.elapsed.as_secs_f64(),
+            mutations: status.mutations,
+            file: path.display().to_string(),
+            bytes,
+            took: took.as_secs_f64(),
+        });
+    }
+
     /// A log to anything that can be written to.
     pub fn new(file: impl Write + Send + 'static) -> Log {
-        let state = State { file: Box::new(file), due: SHORTEST_GAP, elapsed: Duration::ZERO, failed: None };
+        let state =
+            State { file: Box::new(file), due: SHORTEST_GAP, elapsed: Duration::ZERO, goes_on: false, failed: None };
         Log { state: Mutex::new(state) }
     }
 
@@ -91,7 +152,14 @@ impl State {
 
 impl Observer for Log {
     fn started(&self, start: &RunStart) {
-        self.state().line(&Event::RunStart {
+        let mut state = self.state();
+        if state.goes_on {
+            let (threads, settings) = (start.threads, &start.settings);
+            let mutations = start.resumed_at.unwrap_or(0);
+            state.line(&Event::RunResume { mutations, threads, settings, machine: Machine::this() });
+            return;
+        }
+        state.line(&Event::RunStart {
             relt: env!("CARGO_PKG_VERSION"),
             method: start.settings.method.name(),
             seed: start.settings.seed,
@@ -141,6 +209,23 @@ enum Event<'a> {
         machine: Machine,
         #[serde(flatten)]
         start: &'a RunStart,
+    },
+    /// Another process goes on with the run.
+    RunResume {
+        /// Done before.
+        mutations: u64,
+        threads: usize,
+        settings: &'a Settings,
+        machine: Machine,
+    },
+    Checkpoint {
+        /// Wall time of the moment that it is of.
+        seconds: f64,
+        mutations: u64,
+        file: String,
+        bytes: u64,
+        /// How long the run stood still for it, in seconds.
+        took: f64,
     },
     Snapshot {
         #[serde(flatten)]

@@ -2,11 +2,14 @@
 
 mod baseline;
 pub mod calibration;
+pub mod checkpoint;
 pub mod clock;
 pub mod engine;
 pub mod health;
 pub mod log;
+mod merge;
 pub mod output;
+pub mod parts;
 pub mod progress;
 pub mod replay;
 mod replica_exchange;
@@ -17,10 +20,12 @@ pub mod status;
 mod tests;
 pub mod trial;
 
+pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
 pub use health::{Health, Verdict};
+pub use merge::{Merged, MergedPart, merge};
 pub use output::{Output, Picture};
-pub use run::{Job, Outcome, RenderError, engine, run};
+pub use run::{Job, Outcome, RenderError, engine, restored, run, run_from};
 pub use settings::{
-    Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Settings,
+    Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Parts, Settings,
 };
 pub use status::{Observer, RunStart, SetUp, Status, Stop, Summary};

@@ -100,8 +100,8 @@ impl Output {
 /// Texts: `scene`, `method`, `mapping`, `features`, `embree`, `betas`, `acceptance` and `swap` (the latter three with a space
 /// between numbers, as rungs and pairs are in order), `seed` (a number that a double may not hold), for `mlt`
 /// `normalisation_from` and `kelemen_weights` (true or false).
-/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error` and for `mlt`
-/// `large_steps`.
+/// Numbers: `mutations`, `rays`, `seconds`, `non_finite`, `normalisation`, `normalisation_error`, `resumed_at`
+/// (mutations done before the last process took over, if there was more than one) and for `mlt` `large_steps`.
 /// `ladder.NAME`: the last round of replica exchange, with the meanings in [`RoundReport`].
 pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
     let mut data: Vec<(&str, Value)> = vec![
@@ -116,6 +116,7 @@ pub fn metadata(start: &RunStart, status: &Status) -> Vec<(String, Value)> {
         ("seconds", status.elapsed.as_secs_f64().into()),
         ("non_finite", (status.non_finite as f64).into()),
     ];
+    data.extend(start.resumed_at.map(|mutations| ("resumed_at", (mutations as f64).into())));
     if !start.betas.is_empty() {
         data.push(("betas", list(&start.betas).into()));
         data.push(("combine", start.settings.combine.name().into()));

@@ -173,6 +173,7 @@ pub fn heading(start: &RunStart) -> String {
             });
         }
     }
+    words.extend(settings.parts.in_words());
     words.push(format!("{} mapping", start.mapping.name()));
     let mpp = settings.mutations_per_pixel.map(|mpp| format!("{mpp} mutations per pixel"));
     let time = settings.time.map(|time| humantime::format_duration(time).to_string());
@@ -181,6 +182,7 @@ pub fn heading(start: &RunStart) -> String {
         (mpp, time) => words.extend(mpp.or(time)),
     }
     words.push(format!("{} thread{}", start.threads, if start.threads == 1 { "" } else { "s" }));
+    words.extend(start.resumed_at.map(|mutations| format!("going on after {} mutations", with_unit(mutations as f64))));
     words.join(", ")
 }
 
@@ -279,7 +281,7 @@ pub fn ending(summary: &Summary) -> String {
         rough(status.elapsed),
         with_unit(status.mutations_per_second()),
         status.last_round.as_deref().map(|round| format!(", {}", choice(round))).unwrap_or_default(),
-        if files.is_empty() { "nothing".into() } else { files.join(" and ") },
+        if files.is_empty() { "nothing".into() } else { listed(&files) },
     ));
     lines.join("\n")
 }
@@ -295,6 +297,15 @@ pub fn significant(value: f64, digits: usize) -> String {
     match power {
         -3..=4 => format!("{value:.*}", (digits as i32 - 1 - power).max(0) as usize),
         _ => scientific,
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub fn listed(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [others @ .., last] => format!("{} and {last}", others.join(", ")),
     }
 }
 

@@ -1,13 +1,15 @@
 //! `re` and `path`: replica exchange on the light paths of a scene, and its uniform rung alone.
 
+use std::io::{self, Write};
+
 use super::{
-    engine::{Counts, Development, Diagnostics, Engine, Phase, Stage, film_warnings},
+    engine::{Counts, Development, Diagnostics, Engine, Phase, Sheet, Stage, film_warnings},
     settings::{Method, Settings},
 };
 use crate::{
-    chain::Target,
-    film::Footprint,
     path::Workspace,
+    rng::Rng,
+    saved::{Source, Unfit},
     tempering::{Choices, LadderChoice, Learning, RoundReport, Sampler, Setup},
 };
 
@@ -18,23 +20,36 @@ pub struct ReplicaExchange {
 
 impl ReplicaExchange {
     /// Ready to start.
-    pub fn new(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> ReplicaExchange {
-        let film = &stage.mapping.scene().film;
-        let choices = match settings.method {
-            Method::ReplicaExchange => settings.ladder_choices(),
-            _ => Choices { ladder: LadderChoice::Replicas(1), ..Choices::default() },
-        };
-        let setup = Setup {
-            rng: stage.rng,
-            choices,
-            footprint: Footprint::new(film.filter, film.width, film.height),
-            size: stage.size(),
-            unit: f64::from(stage.mapping.scene().emitters.brightest()),
-            elsewhere: stage.mapping.splats_elsewhere(),
-            outcomes: stage.mapping.has_outcomes(),
-            evaluations: mutations,
-        };
-        ReplicaExchange { sampler: Sampler::new(setup) }
+    pub fn new(sheet: &Sheet, rng: Rng, settings: &Settings, mutations: Option<u64>) -> ReplicaExchange {
+        ReplicaExchange { sampler: Sampler::new(set_up(sheet, rng, settings, mutations)) }
+    }
+
+    /// As it was saved, with the settings and the number of mutations that it was planned for.
+    pub fn restored(
+        sheet: &Sheet,
+        rng: Rng,
+        settings: &Settings,
+        planned: Option<u64>,
+        from: &mut Source,
+    ) -> Result<ReplicaExchange, Unfit> {
+        Ok(ReplicaExchange { sampler: Sampler::restored(set_up(sheet, rng, settings, planned), from)? })
+    }
+}
+
+fn set_up(sheet: &Sheet, rng: Rng, settings: &Settings, evaluations: Option<u64>) -> Setup {
+    let choices = match settings.method {
+        Method::ReplicaExchange => settings.ladder_choices(),
+        _ => Choices { ladder: LadderChoice::Replicas(1), ..Choices::default() },
+    };
+    Setup {
+        rng,
+        choices,
+        footprint: sheet.footprint(),
+        size: sheet.size(),
+        unit: sheet.brightest,
+        elsewhere: sheet.elsewhere,
+        outcomes: sheet.outcomes,
+        evaluations,
     }
 }
 
@@ -71,7 +86,7 @@ impl Engine for ReplicaExchange {
         }
     }
 
-    fn develop(&self, _: &Stage) -> Development {
+    fn develop(&self) -> Development {
         let developed = self.sampler.develop();
         let mut warnings = developed.learnt.warnings();
         warnings.extend(film_warnings(self.sampler.film()));
@@ -85,7 +100,20 @@ impl Engine for ReplicaExchange {
                 ..Diagnostics::default()
             },
             warnings,
+            agreement: None,
         }
+    }
+
+    fn points(&self) -> Option<&Sampler<Workspace>> {
+        self.sampler.is_uniform_alone().then_some(&self.sampler)
+    }
+
+    fn set_wanted(&mut self, mutations: Option<u64>) {
+        self.sampler.set_wanted(mutations);
+    }
+
+    fn save(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.sampler.save(out)
     }
 
     fn take_reports(&mut self) -> Vec<RoundReport> {

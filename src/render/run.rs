@@ -1,6 +1,7 @@
 //! The render loop: slices of sweeps until the budget is spent.
 
 use std::{
+    convert::Infallible,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -11,10 +12,12 @@ use std::{
 use super::{
     baseline::Mlt,
     calibration,
+    checkpoint::{Checkpoint, CheckpointError, Header, Resumed},
     clock::Clock,
-    engine::{Diagnostics, Engine, Phase, Stage},
+    engine::{Diagnostics, Engine, Phase, Sheet, Stage},
     health::{self, Evidence, Health},
     output::{Picture, health_metadata, metadata},
+    parts::{Agreement, Several},
     replica_exchange::ReplicaExchange,
     settings::{Method, PacketChoice, Settings},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
@@ -24,6 +27,7 @@ use crate::{
     film::Footprint,
     path::{Fault, Mapping, MappingKind, Widths, first_fault},
     rng::Rng,
+    saved::{Source, Unfit},
     scene::Scene,
     tempering::RoundReport,
 };
@@ -48,6 +52,8 @@ pub struct Outcome {
     pub status: Status,
     /// The mapping, in fact.
     pub mapping: MappingKind,
+    /// Whether the parts that it had tell the same, where there were several.
+    pub agreement: Option<Agreement>,
     /// It was stopped before its budget was spent.
     pub interrupted: bool,
     /// What the person should know, one sentence each.
@@ -59,6 +65,9 @@ pub struct Outcome {
 /// Why a run could not take place.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
+    /// A checkpoint cannot be gone on with.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// The operating system gave no threads.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {
@@ -77,32 +86,100 @@ const SHORTEST_SLICE: Duration = Duration::from_millis(2);
 
 /// Renders a job and tells `observer` how it goes.
 pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
-    let clock = Clock::start();
-    let threads = job.settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
-    let pool = thread_pool(threads, job.settings.pin)?;
-    let (mapping, mapping_trial) = pool.install(|| trial::settle(job.scene, &job.settings));
-    let widths = match job.settings.packet {
+    run_from(job, "", None, observer)
+}
+
+/// As [`run`], from a checkpoint on where there is one, of the same scene and with settings that
+/// [agree](Resumed::agrees). `scene_digest` goes into the checkpoints that are taken.
+pub fn run_from(
+    job: &Job,
+    scene_digest: &str,
+    mut resumed: Option<Resumed>,
+    observer: &dyn Observer,
+) -> Result<Outcome, RenderError> {
+    let settings = &job.settings;
+    let before = resumed.as_ref().map(|resumed| resumed.header.clone());
+    let clock = before.as_ref().map_or_else(Clock::start, |b| Clock::going_on(b.done.elapsed, b.done.cpu));
+    let began = clock.elapsed();
+    let threads = settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+    let pool = thread_pool(threads, settings.pin)?;
+    let (mapping, mapping_trial) = match &before {
+        Some(before) => (before.start.mapping, before.start.mapping_trial.clone()),
+        None => pool.install(|| trial::settle(job.scene, settings)),
+    };
+    let widths = match settings.packet {
         PacketChoice::Auto => calibration::calibrate(job.scene, mapping),
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
     };
     let film = job.scene.film;
     let stage = Stage {
-        mapping: Mapping::new(job.scene, mapping, widths).with_technique_changes(job.settings.technique_changes),
+        mapping: Mapping::new(job.scene, mapping, widths).with_technique_changes(settings.technique_changes),
         footprint: Footprint::new(film.filter, film.width, film.height),
-        rng: Rng::new(job.settings.seed),
+        rng: Rng::new(settings.seed),
     };
-    let start = RunStart { mapping, mapping_trial, ..run_start(job, threads, widths) };
+    let resumed_at = before.as_ref().map(|before| before.done.mutations);
+    let start = RunStart { mapping, mapping_trial, resumed_at, ..run_start(job, threads, widths) };
     observer.started(&start);
+    let frame = Frame {
+        start: &start,
+        scene_digest,
+        arithmetic: job.scene.tracer.device().arithmetic(),
+        sheet: stage.sheet(),
+        planned: before.as_ref().map_or(settings.mutations_per_pixel, |before| before.planned_mutations_per_pixel),
+    };
     let mut watch = Watch { clock, set_up: SetUp::default(), last_round: None };
-    watch.set_up.calibration = watch.clock.elapsed();
-    let (mut engine, interrupted) = pool.install(|| {
-        let mutations = job.settings.mutations_per_pixel.map(|mpp| (mpp * stage.pixels() as f64).ceil() as u64);
-        let mut engine = engine(&stage, &job.settings, mutations);
-        watch.set_up.bootstrap = watch.clock.elapsed() - watch.set_up.calibration;
-        let interrupted = work(job, &stage, engine.as_mut(), &start, observer, &mut watch);
-        (engine, interrupted)
-    });
+    if let Some(Header { done, last_round, .. }) = before {
+        (watch.set_up, watch.last_round) = (done.set_up, last_round.map(Arc::new));
+    }
+    watch.set_up.calibration += watch.clock.elapsed() - began;
+    let (mut engine, interrupted) = pool.install(|| -> Result<_, CheckpointError> {
+        let began = watch.clock.elapsed();
+        let [planned, wanted] =
+            [frame.planned, settings.mutations_per_pixel].map(|mpp| settings.parts.mutations(mpp, stage.pixels()));
+        let mut engine = match &mut resumed {
+            Some(resumed) => frame.restored(resumed)?,
+            None => engine(&stage, settings, planned),
+        };
+        engine.set_wanted(wanted);
+        if resumed_at.is_none() {
+            watch.set_up.bootstrap = watch.clock.elapsed() - began;
+        }
+        let interrupted = work(job, &stage, engine.as_mut(), &frame, observer, &mut watch);
+        observer.ended(&frame.checkpoint(&status(job, engine.as_ref(), &watch), engine.as_ref()));
+        Ok((engine, interrupted))
+    })?;
     Ok(conclude(job, &stage, engine.as_mut(), &start, &watch, interrupted))
+}
+
+/// What is fixed about a run and goes into its checkpoints.
+struct Frame<'a> {
+    start: &'a RunStart,
+    scene_digest: &'a str,
+    arithmetic: String,
+    sheet: Sheet,
+    planned: Option<f64>,
+}
+
+impl Frame<'_> {
+    fn checkpoint<'a>(&'a self, status: &'a Status, engine: &'a dyn Engine) -> Checkpoint<'a> {
+        Checkpoint {
+            start: self.start,
+            scene_digest: self.scene_digest,
+            arithmetic: &self.arithmetic,
+            sheet: self.sheet,
+            planned_mutations_per_pixel: self.planned,
+            status,
+            engine,
+        }
+    }
+
+    /// The method as the checkpoint has it.
+    fn restored(&self, resumed: &mut Resumed) -> Result<Box<dyn Engine>, CheckpointError> {
+        if resumed.header.sheet != self.sheet {
+            return Err(resumed.unfit("its film is another than the scene's"));
+        }
+        resumed.engine()
+    }
 }
 
 /// What the render loop keeps about a run's course.
@@ -124,12 +201,39 @@ pub(super) fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool
     builder.build().map_err(|e| RenderError::Threads { threads, reason: e.to_string() })
 }
 
-/// The method of those settings, ready to work on `mutations` evaluations or without end.
+/// The method of those settings with its parts, each ready to work on `mutations` evaluations or without end.
 pub fn engine(stage: &Stage, settings: &Settings, mutations: Option<u64>) -> Box<dyn Engine> {
-    match settings.method {
-        Method::Mlt => Box::new(Mlt::new(stage, &settings.mlt, mutations)),
-        Method::Path | Method::ReplicaExchange => Box::new(ReplicaExchange::new(stage, settings, mutations)),
-    }
+    let sheet = stage.sheet();
+    let make = |rng: Rng| -> Result<Box<dyn Engine>, Infallible> {
+        Ok(match settings.method {
+            Method::Mlt => Box::new(Mlt::new(stage, rng, &settings.mlt, mutations)),
+            Method::Path | Method::ReplicaExchange => Box::new(ReplicaExchange::new(&sheet, rng, settings, mutations)),
+        })
+    };
+    let Ok(engine) = Several::engine(settings.parts, sheet, stage.rng, make);
+    engine
+}
+
+/// The method that [`Engine::save`] wrote, of those settings, that sheet and those random numbers of the job, each part
+/// planned for as many mutations.
+pub fn restored(
+    sheet: &Sheet,
+    rng: Rng,
+    settings: &Settings,
+    planned: Option<u64>,
+    from: &mut Source,
+) -> Result<Box<dyn Engine>, Unfit> {
+    let make = |rng: Rng| -> Result<Box<dyn Engine>, Unfit> {
+        Ok(match settings.method {
+            Method::Mlt => Box::new(Mlt::restored(sheet, rng, &settings.mlt, planned, from)?),
+            Method::Path | Method::ReplicaExchange => {
+                Box::new(ReplicaExchange::restored(sheet, rng, settings, planned, from)?)
+            }
+        })
+    };
+    let engine = Several::engine(settings.parts, *sheet, rng, make)?;
+    from.end()?;
+    Ok(engine)
 }
 
 /// Slice after slice until a budget is spent or the run is stopped from outside, which is what it returns.
@@ -137,7 +241,7 @@ fn work(
     job: &Job,
     stage: &Stage,
     engine: &mut dyn Engine,
-    start: &RunStart,
+    frame: &Frame,
     observer: &dyn Observer,
     watch: &mut Watch,
 ) -> bool {
@@ -181,14 +285,17 @@ fn work(
         rounds.iter().for_each(|round| observer.round(round));
         if observer.wants_picture(&status) {
             let look = || {
-                let development = engine.develop(stage);
+                let development = engine.develop();
                 let normalisation = development.normalisation.map(|e| (e.value, e.standard_error));
                 let status = Status { normalisation, ..status.clone() };
-                let metadata = metadata(start, &status);
+                let metadata = metadata(frame.start, &status);
                 let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
                 observer.snapshot(&status, &picture);
             };
             if observer.stops_the_clock() { watch.clock.pause(look) } else { look() }
+        }
+        if observer.wants_checkpoint(&status) {
+            observer.checkpoint(&frame.checkpoint(&status, engine));
         }
     }
 }
@@ -222,7 +329,7 @@ fn conclude(
     interrupted: bool,
 ) -> Outcome {
     let status = status(job, engine, watch);
-    let development = engine.develop(stage);
+    let development = engine.develop();
     let status = Status { normalisation: development.normalisation.map(|e| (e.value, e.standard_error)), ..status };
     let mut warnings = development.warnings;
     if development.image.pixels.iter().flatten().all(|v| *v == 0.0) {
@@ -247,8 +354,9 @@ fn conclude(
     });
     let mut metadata = metadata(start, &status);
     metadata.extend(health_metadata(&health));
+    metadata.extend(development.agreement.iter().flat_map(Agreement::metadata));
     let picture = Picture::new(&job.scene.film, development.image, development.layers, metadata);
-    Outcome { picture, status, mapping: start.mapping, interrupted, warnings, health }
+    Outcome { picture, status, mapping: start.mapping, agreement: development.agreement, interrupted, warnings, health }
 }
 
 /// The one of the round at work and the last that ended that knows more.
@@ -299,7 +407,11 @@ fn run_start(job: &Job, threads: usize, widths: Widths) -> RunStart {
 
 #[cfg(test)]
 mod tests {
-    use std::{path::Path, sync::Mutex};
+    use std::{
+        io::{self, Write},
+        path::Path,
+        sync::Mutex,
+    };
 
     use super::*;
     use crate::{
@@ -340,7 +452,7 @@ mod tests {
             Counts { mutations: self.sweeps, ..Counts::default() }
         }
 
-        fn develop(&self, _: &Stage) -> Development {
+        fn develop(&self) -> Development {
             let image = Image::constant(1, 1, [1.0; 3]);
             Development {
                 image,
@@ -348,7 +460,14 @@ mod tests {
                 normalisation: None,
                 warnings: Vec::new(),
                 diagnostics: Diagnostics::default(),
+                agreement: None,
             }
+        }
+
+        fn set_wanted(&mut self, _: Option<u64>) {}
+
+        fn save(&self, _: &mut dyn Write) -> io::Result<()> {
+            Ok(())
         }
 
         fn take_reports(&mut self) -> Vec<RoundReport> {
@@ -445,7 +564,9 @@ mod tests {
         let (mut engine, start) = (Rounds { sweeps: 0, reports: Vec::new() }, RunStart::default());
         let notes = Notes::default();
         let mut watch = Watch { clock: Clock::start(), set_up: SetUp::default(), last_round: None };
-        assert!(!work(&job, &stage, &mut engine, &start, &notes, &mut watch));
+        let (arithmetic, sheet) = (String::new(), stage.sheet());
+        let frame = Frame { start: &start, scene_digest: "", arithmetic, sheet, planned: None };
+        assert!(!work(&job, &stage, &mut engine, &frame, &notes, &mut watch));
         assert_eq!(*notes.rounds.lock().unwrap(), [0, 1, 2]);
         let last = notes.last.lock().unwrap();
         assert_eq!((last.first(), last.last()), (Some(&Some(1)), Some(&Some(2))), "{last:?}");

@@ -3,8 +3,9 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
+pub use super::parts::Parts;
 use crate::chain::LARGE_STEP_PROBABILITY;
 pub use crate::chain::Measure;
 use crate::embree::Width;
@@ -12,7 +13,7 @@ use crate::path::MappingKind;
 pub use crate::tempering::{Choices, Combine, LadderChoice};
 
 /// How the image is estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Method {
     /// Stratified samples and nothing else.
     #[serde(rename = "path")]
@@ -41,7 +42,7 @@ impl Method {
 }
 
 /// Where `mlt` has its normalisation c from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normalisation {
     /// The mean of g over the first pass alone. The image is unbiased, as chains start from states resampled among the
@@ -79,7 +80,7 @@ impl Normalisation {
 ///
 /// Pooling takes out the error of brightness, up to 6 % here, which relMSE hardly minds beside noise of this size.
 /// The weights change only what samples with g/c up to about p add: much of the box, little of the others' noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MltSettings {
     /// Probability of a large step, in (0, 1).
     pub large_steps: f64,
@@ -148,17 +149,58 @@ pub enum PacketChoice {
     Fixed(Width),
 }
 
-impl Serialize for PacketChoice {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+impl<'de> Deserialize<'de> for MappingChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<MappingChoice, D::Error> {
+        named(deserializer, &MappingChoice::ALL, |choice| choice.name())
+    }
+}
+
+/// The one of `all` that a text names.
+fn named<'de, T: Copy, D: Deserializer<'de>>(
+    deserializer: D,
+    all: &[T],
+    name: fn(&T) -> &'static str,
+) -> Result<T, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    all.iter().find(|one| name(one) == text).copied().ok_or_else(|| D::Error::custom(format_args!("unknown: {text}")))
+}
+
+impl PacketChoice {
+    /// All of them.
+    pub const ALL: [PacketChoice; 5] = [
+        PacketChoice::Auto,
+        PacketChoice::Fixed(Width::W1),
+        PacketChoice::Fixed(Width::W4),
+        PacketChoice::Fixed(Width::W8),
+        PacketChoice::Fixed(Width::W16),
+    ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
         match self {
-            PacketChoice::Auto => serializer.serialize_str("auto"),
-            PacketChoice::Fixed(width) => serializer.collect_str(width),
+            PacketChoice::Auto => "auto",
+            PacketChoice::Fixed(Width::W1) => "1",
+            PacketChoice::Fixed(Width::W4) => "4",
+            PacketChoice::Fixed(Width::W8) => "8",
+            PacketChoice::Fixed(Width::W16) => "16",
         }
     }
 }
 
+impl<'de> Deserialize<'de> for PacketChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<PacketChoice, D::Error> {
+        named(deserializer, &PacketChoice::ALL, |choice| choice.name())
+    }
+}
+
+impl Serialize for PacketChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// Everything about a run but its scene and its files.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// How the image is estimated.
     pub method: Method,
@@ -166,6 +208,9 @@ pub struct Settings {
     pub mapping: MappingChoice,
     /// Of all random numbers; the same seed gives the same image for the same budget in mutations.
     pub seed: u64,
+    /// Into how many independent parts the job is cut, and which of them is run.
+    #[serde(default)]
+    pub parts: Parts,
     /// Worker threads; as many as the machine runs at once where absent.
     pub threads: Option<usize>,
     /// Keep every worker on a core of its own.
@@ -173,7 +218,7 @@ pub struct Settings {
     /// Budget in mutations per pixel, independent samples included.
     pub mutations_per_pixel: Option<f64>,
     /// Budget in wall time, seconds in the log.
-    #[serde(serialize_with = "seconds")]
+    #[serde(serialize_with = "seconds", deserialize_with = "from_seconds")]
     pub time: Option<Duration>,
     /// Inverse temperatures, for replica exchange.
     pub ladder: LadderChoice,
@@ -202,6 +247,7 @@ impl Default for Settings {
             method: Method::default(),
             mapping: MappingChoice::default(),
             seed: 0,
+            parts: Parts::default(),
             threads: None,
             pin: false,
             mutations_per_pixel: Some(DEFAULT_MUTATIONS_PER_PIXEL),
@@ -295,6 +341,7 @@ impl Settings {
         if self.method == Method::Mlt {
             faults.extend(large_steps_fault(self.mlt.large_steps));
         }
+        faults.extend(parts_fault(self.parts));
         self.budget_faults(&mut faults);
         if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
             faults.push(format!("--threads {threads}: a run needs 1 to {MOST_THREADS} threads"));
@@ -328,6 +375,15 @@ impl Settings {
             Some(time) if time > LONGEST => faults.push("--time: more than a year is surely a mistake".into()),
             _ => {}
         }
+    }
+}
+
+fn parts_fault(Parts { of, only }: Parts) -> Option<String> {
+    match only {
+        _ if of == 0 => Some("--parts 0: a job has one part at least".into()),
+        _ if of > Parts::MOST => Some(format!("--parts {of}: at most {} parts", Parts::MOST)),
+        Some(only) if !(1..=of).contains(&only) => Some(format!("--part {only}/{of}: parts are 1 to {of}")),
+        _ => None,
     }
 }
 
@@ -383,6 +439,11 @@ fn large_steps_fault(p: f64) -> Option<String> {
 
 fn seconds<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
     time.map(|time| time.as_secs_f64()).serialize(serializer)
+}
+
+fn from_seconds<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Duration>, D::Error> {
+    let seconds: Option<f64> = Deserialize::deserialize(deserializer)?;
+    seconds.map(|seconds| Duration::try_from_secs_f64(seconds).map_err(D::Error::custom)).transpose()
 }
 
 #[cfg(test)]

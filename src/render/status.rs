@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::checkpoint::Checkpoint;
 use super::health::Health;
 use super::output::Picture;
 use super::settings::Settings;
@@ -14,7 +15,7 @@ use crate::path::{Faults, MappingKind};
 use crate::tempering::RoundReport;
 
 /// What is known once a run begins.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunStart {
     /// The scene file.
     pub scene: String,
@@ -40,10 +41,13 @@ pub struct RunStart {
     pub embree_library: String,
     /// Rays in a packet.
     pub packets: Packets,
+    /// Mutations that were done before, where a checkpoint is gone on with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resumed_at: Option<u64>,
 }
 
 /// Packet widths that were chosen, by kind of ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Packets {
     /// For camera rays.
     pub camera: usize,
@@ -87,7 +91,7 @@ pub struct Status {
 }
 
 /// Wall time of a run before it works at full pace.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetUp {
     /// Starting threads, trying mappings and measuring packet widths.
     pub calibration: Duration,
@@ -191,6 +195,17 @@ pub trait Observer: Sync {
 
     /// The picture so far.
     fn snapshot(&self, _status: &Status, _picture: &Picture) {}
+
+    /// Whether [`checkpoint`](Observer::checkpoint) should follow.
+    fn wants_checkpoint(&self, _status: &Status) -> bool {
+        false
+    }
+
+    /// The run as it is now, to be written and gone on with later.
+    fn checkpoint(&self, _checkpoint: &Checkpoint) {}
+
+    /// The run as it ends, before anything is made of it.
+    fn ended(&self, _checkpoint: &Checkpoint) {}
 
     /// All is over, files are written. The render loop does not call this; whoever wrote the files does.
     fn finished(&self, _summary: &Summary) {}

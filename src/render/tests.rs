@@ -5,13 +5,14 @@ use std::path::Path;
 use super::{
     LadderChoice, Method, MltSettings, Normalisation, Settings,
     engine::{Counts, Engine, Stage},
-    run::engine,
+    run::{engine, restored},
 };
 use crate::{
     embree::{Device, Width},
     film::{Footprint, Plane},
     path::{Mapping, MappingKind, Widths},
     rng::Rng,
+    saved::Source,
     scene::Scene,
     tempering::Estimate,
 };
@@ -19,8 +20,8 @@ use crate::{
 const MUTATIONS: u64 = 40_000;
 
 /// Everything that can be seen of an engine, as bits.
-fn bits(engine: &dyn Engine, stage: &Stage) -> Vec<u64> {
-    let development = engine.develop(stage);
+fn bits(engine: &dyn Engine) -> Vec<u64> {
+    let development = engine.develop();
     let mut planes = vec![development.image.pixels.as_flattened().to_vec()];
     planes.extend(development.layers.into_iter().map(|(_, plane)| match plane {
         Plane::Rgb(image) => image.pixels.into_flattened(),
@@ -42,10 +43,10 @@ fn run(stage: &Stage, settings: &Settings, lengths: &[u64], watched: bool) -> Ve
         }
         engine.advance(stage, *length, None);
         if watched {
-            engine.develop(stage);
+            engine.develop();
         }
     }
-    bits(engine.as_ref(), stage)
+    bits(engine.as_ref())
 }
 
 fn scene(name: &str) -> Scene {
@@ -71,7 +72,7 @@ fn before_chains_move_replica_exchange_is_a_path_tracer() {
         let settings = Settings { method, ..Settings::default() };
         let mut engine = engine(&stage, &settings, Some(MUTATIONS));
         engine.advance(&stage, 1, None);
-        engine.develop(&stage).image
+        engine.develop().image
     };
     let image = picture(Method::ReplicaExchange);
     assert!(image.mean().iter().all(|channel| *channel > 0.01), "{:?}", image.mean());
@@ -94,7 +95,7 @@ fn the_normalisation_of_metropolis_varies_by_its_standard_error() {
                 let stage = Stage { rng: Rng::new(seed), ..stage(&scene) };
                 let mut engine = engine(&stage, &settings, Some(MUTATIONS));
                 engine.advance(&stage, engine.sweeps_left().expect("a limited run"), None);
-                engine.develop(&stage).normalisation.expect("every method has one")
+                engine.develop().normalisation.expect("every method has one")
             })
             .collect();
         let mean = estimates.iter().map(|e| e.value).sum::<f64>() / 32.0;
@@ -119,6 +120,50 @@ fn a_run_gives_the_same_bits_however_it_is_sliced() {
             for (lengths, watched) in [(&[1][..], false), (&[7, 1, 40], true), (&[64, 64, 3], false)] {
                 let sliced = run(&stage, &settings, lengths, watched);
                 assert!(sliced == whole, "{name}, {settings:?}: slices of {lengths:?}, watched: {watched}");
+            }
+        }
+    }
+}
+
+/// The same, saved after every slice and gone on with by another engine.
+fn run_in_pieces(stage: &Stage, settings: &Settings, lengths: &[u64]) -> Vec<u64> {
+    let mut engine = engine(stage, settings, Some(MUTATIONS));
+    for length in lengths.iter().cycle() {
+        if engine.sweeps_left() == Some(0) {
+            break;
+        }
+        engine.advance(stage, *length, None);
+        engine.take_reports();
+        let mut bytes = Vec::new();
+        engine.save(&mut bytes).unwrap();
+        let mut source = Source::new(&bytes[..], bytes.len() as u64);
+        let later = restored(&stage.sheet(), stage.rng, settings, Some(MUTATIONS), &mut source).unwrap();
+        assert!(bits(later.as_ref()) == bits(engine.as_ref()), "{settings:?}: already at once");
+        assert_eq!(format!("{:?}", later.counts()), format!("{:?}", engine.counts()), "{settings:?}");
+        engine = later;
+    }
+    bits(engine.as_ref())
+}
+
+#[test]
+fn a_run_that_is_saved_and_gone_on_with_gives_the_same_bits() {
+    let scene = scene("lattice");
+    for kind in MappingKind::ALL {
+        let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
+        for changes in [false, true] {
+            if changes && kind != MappingKind::Multiplexed {
+                continue;
+            }
+            let mapping = Mapping::new(&scene, kind, widths).with_technique_changes(changes);
+            let stage = Stage { mapping, ..stage(&scene) };
+            let ladder = |k| Settings { ladder: LadderChoice::Replicas(k), layers: true, ..Settings::default() };
+            let plain = |method| Settings { method, ..Settings::default() };
+            let mlt = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
+            let mlt = Settings { mlt, ..plain(Method::Mlt) };
+            for settings in [plain(Method::Path), plain(Method::ReplicaExchange), mlt, ladder(5)] {
+                let whole = run(&stage, &settings, &[u64::MAX], false);
+                let pieces = run_in_pieces(&stage, &settings, &[1, 30, 150]);
+                assert!(pieces == whole, "{kind:?}, changes {changes}, {settings:?}");
             }
         }
     }

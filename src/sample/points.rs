@@ -1,5 +1,7 @@
 //! Points of many lanes, as a structure of arrays.
 
+use serde::{Deserialize, Serialize};
+
 use super::Block;
 
 /// Added to the numbers of blocks of a point's second stream.
@@ -10,7 +12,8 @@ pub const LIGHT_STREAM: u16 = 1 << 15;
 /// A point has two streams of blocks, one for the camera's subpath and one, from number [`LIGHT_STREAM`] on, for the
 /// light's, so that either may be longer than before without the other. Blocks of the same number lie together over all
 /// lanes. Rows are added when a lane first reaches that far and then stay, so a batch that is warm allocates nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "SavedPoints", try_from = "SavedPoints")]
 pub struct Points {
     lanes: usize,
     streams: [Stream; 2],
@@ -99,6 +102,65 @@ impl Points {
                 stream.blocks[b * self.lanes + to] = theirs.blocks[b * other.lanes + from];
             }
             stream.used[to] = used as u16;
+        }
+    }
+}
+
+/// Points as they are saved: the blocks that exist, lane by lane, of either stream.
+#[derive(Serialize, Deserialize)]
+struct SavedPoints(Vec<[Vec<Block>; 2]>);
+
+impl From<Points> for SavedPoints {
+    fn from(points: Points) -> SavedPoints {
+        let of_lane = |lane: usize, stream: &Stream| {
+            (0..usize::from(stream.used[lane])).map(|b| stream.blocks[b * points.lanes + lane]).collect()
+        };
+        SavedPoints((0..points.lanes).map(|lane| points.streams.each_ref().map(|s| of_lane(lane, s))).collect())
+    }
+}
+
+impl TryFrom<SavedPoints> for Points {
+    type Error = &'static str;
+
+    fn try_from(SavedPoints(saved): SavedPoints) -> Result<Points, &'static str> {
+        let mut points = Points::new(saved.len());
+        for (lane, streams) in saved.iter().enumerate() {
+            for (blocks, start) in streams.iter().zip([0, LIGHT_STREAM]) {
+                if blocks.len() > usize::from(LIGHT_STREAM) {
+                    return Err("a point has too many dimensions");
+                }
+                for (number, block) in (start..).zip(blocks) {
+                    points.reserve(number);
+                    points.set(number, lane, *block);
+                }
+            }
+        }
+        Ok(points)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn saved_points_are_those_that_were() {
+        let mut points = Points::new(3);
+        for (block, lane) in [(0, 0), (1, 0), (0, 2), (LIGHT_STREAM, 1), (LIGHT_STREAM + 1, 1)] {
+            points.reserve(block);
+            points.set(block, lane, [u32::from(block), lane as u32, u32::MAX, 7]);
+        }
+        points.clear(2); // what a lane forgot is not saved
+        let bytes = postcard::to_stdvec(&points).unwrap();
+        let back: Points = postcard::from_bytes(&bytes).unwrap();
+        assert_eq!(back.lanes(), 3);
+        for lane in 0..3 {
+            assert_eq!(back.used(lane), points.used(lane), "lane {lane}");
+            for block in [0, 1, LIGHT_STREAM, LIGHT_STREAM + 1] {
+                if points.has(block, lane) {
+                    assert_eq!(back.block(block, lane), points.block(block, lane));
+                }
+            }
         }
     }
 }

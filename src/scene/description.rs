@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Vec3};
 
+use serde::{Deserialize, Serialize};
+
 use super::{Appearance, Mesh, lights::Light, textures::Varying};
 use crate::film::{Filter, PixelFormat, Window};
 
@@ -103,7 +105,7 @@ pub struct Lens {
 }
 
 /// Size and reconstruction filter of the picture, which may be a part of a larger one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilmDescription {
     /// Width in pixels of the picture that is made, ≥ 1.
     pub width: u32,

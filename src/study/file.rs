@@ -175,7 +175,22 @@ const SNAPSHOTS: usize = 12;
 /// Errors are first taken after this part of the budget where the study does not say.
 const FIRST_SNAPSHOT: f64 = 1.0 / 64.0;
 /// Options that the study itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 9] = ["seed", "mpp", "time", "output", "snapshot", "log", "quiet", "verbose", "layers"];
+const NOT_OPTIONS: [&str; 14] = [
+    "seed",
+    "mpp",
+    "time",
+    "output",
+    "snapshot",
+    "log",
+    "checkpoint",
+    "checkpoint-file",
+    "resume",
+    "part",
+    "parts",
+    "quiet",
+    "verbose",
+    "layers",
+];
 /// Options whose value is itself a list: a list of lists varies them.
 const LISTS: [&str; 1] = ["betas"];
 

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::checksum::Checksum;
 use super::file::{Budget, Study};
 use super::file_name;
 use super::metrics::Reference;
+use crate::checksum::Checksum;
 use crate::load;
 use crate::render::Settings;
 use crate::scene::SceneDescription;

@@ -1,6 +1,5 @@
 //! What runs leave behind, read and drawn.
 
-pub mod checksum;
 pub mod collect;
 pub mod error_image;
 pub mod file;

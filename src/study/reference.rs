@@ -12,8 +12,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::checksum::Checksum;
 use super::metrics::{FLOOR, Reference};
+use crate::checksum::Checksum;
 use crate::film::Image;
 use crate::film::file::{FileError, write_whole};
 use crate::path::MappingKind;
@@ -43,9 +43,7 @@ pub fn accumulate<E>(
 
 /// Seed of the pass of that number, from the seed of the whole: a word of the stream for it.
 pub fn pass_seed(seed: u64, pass: u64) -> u64 {
-    let counter = Counter { ladder: 0, replica: 0, step: pass, purpose: Purpose::Pass };
-    let [low, high, ..] = Rng::new(seed).words(counter, 0);
-    u64::from(high) << 32 | u64::from(low)
+    Rng::new(seed).seed(Counter { ladder: 0, replica: 0, step: pass, purpose: Purpose::Pass })
 }
 
 /// What is known of all passes so far.

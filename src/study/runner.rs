@@ -8,11 +8,11 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::checksum::Checksum;
 use super::file::{Budget, Study};
 use super::jobs::{Prepared, StudyJob, keeps_images, reference_image, scene_words};
 use super::metrics::{Errors, Reference};
 use super::record::{JobEnd, JobHead, Moment, SharedFile};
+use crate::checksum::Checksum;
 use crate::embree::Device;
 use crate::film::file::FileError;
 use crate::film::{Plane, exr_file};

@@ -3,9 +3,10 @@
 use std::{ops::Range, sync::Arc};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    Canvas, Histogram, Round, RungCounts, Sum, Tally,
+    Canvas, Histogram, Round, RungCounts, SavedTally, Sum, Tally,
     ladder::swap_acceptance,
     probes::TRIALS,
     steps::{self, SCALES, StepMix},
@@ -16,6 +17,7 @@ use crate::{
     path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
+    saved::{Unfit, expect},
 };
 
 /// Whole ladders whose replicas and offered points are evaluated together.
@@ -60,6 +62,27 @@ struct Part<W> {
     /// Scale of each replica's step at work, and the random word that will decide on it.
     scale: Vec<u8>,
     decision: Vec<u32>,
+}
+
+/// A [`Block`] as it is saved.
+#[derive(Serialize, Deserialize)]
+pub struct SavedBlock {
+    parts: Vec<SavedPart>,
+    rung: Vec<u16>,
+    trips: Trips,
+    index: Option<IndexProcess>,
+    sweeps: u64,
+}
+
+/// A [`Part`] as it is saved: what it works with between two sweeps follows from the job.
+#[derive(Serialize, Deserialize)]
+struct SavedPart {
+    walkers: Walkers,
+    tally: SavedTally,
+    refused: Vec<u32>,
+    /// Of replayed starts, which no sweep has accounted for yet.
+    rays: u64,
+    faults: Faults,
 }
 
 impl<W: Default + Send> Block<W> {
@@ -109,6 +132,46 @@ impl<W: Default + Send> Block<W> {
             });
         }
         block
+    }
+
+    /// All that there is to save between sweeps.
+    pub fn saved(&self) -> SavedBlock {
+        let part = |part: &Part<W>| SavedPart {
+            walkers: part.walkers.clone(),
+            tally: part.tally.saved(),
+            refused: part.refused.clone(),
+            rays: part.evaluator.out.rays,
+            faults: part.evaluator.out.faults.clone(),
+        };
+        SavedBlock {
+            parts: self.parts.iter().map(part).collect(),
+            rung: self.rung.clone(),
+            trips: self.trips.clone(),
+            index: self.index.clone(),
+            sweeps: self.sweeps,
+        }
+    }
+
+    /// Goes on where a block with the same ladders and offers was saved.
+    pub fn restore(&mut self, saved: SavedBlock) -> Result<(), Unfit> {
+        let SavedBlock { parts, rung, trips, index, sweeps } = saved;
+        expect(parts.len() == self.parts.len() && index.is_some() == self.index.is_some(), "ladders")?;
+        for (part, saved) in self.parts.iter_mut().zip(parts) {
+            expect(saved.walkers.fits(part.replicas) && saved.refused.len() == part.replicas, "chains")?;
+            part.tally.restore(saved.tally)?;
+            (part.walkers, part.refused) = (saved.walkers, saved.refused);
+            (part.evaluator.out.rays, part.evaluator.out.faults) = (saved.rays, saved.faults);
+        }
+        expect(rung.len() == self.rung.len() && trips.fits(rung.len(), self.chains), "replicas")?;
+        let mut replica_on = vec![u16::MAX; rung.len()];
+        for (lane, k) in rung.iter().enumerate() {
+            let (ladder, replica) = (lane / self.chains, lane % self.chains);
+            expect((1..=self.chains).contains(&usize::from(*k)), "rungs")?;
+            replica_on[ladder * self.chains + usize::from(*k) - 1] = replica as u16;
+        }
+        expect(replica_on.iter().all(|replica| *replica != u16::MAX), "rungs")?;
+        (self.rung, self.replica_on, self.trips, self.index, self.sweeps) = (rung, replica_on, trips, index, sweeps);
+        Ok(())
     }
 
     /// Changes the number of points offered to a ladder each sweep.

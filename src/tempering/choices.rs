@@ -1,11 +1,11 @@
 //! What may be chosen about a ladder.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::Measure;
 
 /// The rungs of the ladders.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LadderChoice {
     /// Their number follows from the communication barrier, and chains are given up where path tracing is best.
@@ -17,8 +17,19 @@ pub enum LadderChoice {
     Betas(Vec<f64>),
 }
 
+impl LadderChoice {
+    /// As on the command line: `auto`, `4` or `0,0.5,1`.
+    pub fn in_words(&self) -> String {
+        match self {
+            LadderChoice::Auto => "auto".into(),
+            LadderChoice::Replicas(k) => k.to_string(),
+            LadderChoice::Betas(betas) => betas.iter().map(f64::to_string).collect::<Vec<_>>().join(","),
+        }
+    }
+}
+
 /// How the estimates of the rungs become one image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Combine {
     /// All samples of all rungs, weighed by the balance heuristic: unbiased given the normalisers.

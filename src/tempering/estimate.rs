@@ -1,10 +1,12 @@
 //! Estimates with standard errors, from independent groups of ladders.
 
+use serde::{Deserialize, Serialize};
+
 use super::Histogram;
 
 /// A number ≥ 0 and the standard error of its estimate. The logarithm and the relative error are the primary ones: they
 /// hold where the number itself leaves the range of f64.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The number, e^`ln_value`; ∞ or 0 beyond the range of f64.
     pub value: f64,

@@ -1,5 +1,7 @@
 //! Histograms of ln g.
 
+use serde::{Deserialize, Serialize};
+
 /// Weights of states by ln g: all that the normalisers need to know of a rung's states, since every rung's density
 /// depends on ln g only.
 ///
@@ -15,7 +17,8 @@
 ///
 /// Bins are kept in pages of one nat, made when a state comes. ±700 nats, filled, are 1.4 MB; a single absurd value is
 /// one page; beyond ±16,384 nats ln g is taken as that, so the directory of pages never exceeds 256 kB.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(into = "SavedHistogram", try_from = "SavedHistogram")]
 pub struct Histogram {
     /// Number of the page that `pages[0]` is; page p holds ln g ∈ [p, p + 1).
     first: i64,
@@ -173,6 +176,39 @@ impl Histogram {
     }
 }
 
+/// A histogram as it is saved: the bins that are not empty.
+#[derive(Serialize, Deserialize)]
+struct SavedHistogram {
+    lit: i128,
+    dark: i64,
+    /// Number, weight and moment.
+    bins: Vec<(i64, i64, i64)>,
+}
+
+impl From<Histogram> for SavedHistogram {
+    fn from(histogram: Histogram) -> SavedHistogram {
+        let bins = histogram.sums().map(|(number, bin)| (number, bin.weight, bin.moment)).collect();
+        SavedHistogram { lit: histogram.lit, dark: histogram.dark, bins }
+    }
+}
+
+impl TryFrom<SavedHistogram> for Histogram {
+    type Error = &'static str;
+
+    fn try_from(saved: SavedHistogram) -> Result<Histogram, &'static str> {
+        let mut histogram = Histogram { lit: saved.lit, dark: saved.dark, ..Histogram::default() };
+        let farthest = FARTHEST as i64 * BINS_PER_NAT;
+        for (number, weight, moment) in saved.bins {
+            if !(-farthest..=farthest).contains(&number) || weight <= 0 {
+                return Err("a bin of a histogram cannot be");
+            }
+            let page = histogram.page(number.div_euclid(BINS_PER_NAT));
+            page[number.rem_euclid(BINS_PER_NAT) as usize] = Bin { weight, moment };
+        }
+        Ok(histogram)
+    }
+}
+
 /// The same states in the same bins; how the pages came to be does not matter.
 impl PartialEq for Histogram {
     fn eq(&self, other: &Histogram) -> bool {
@@ -225,6 +261,18 @@ mod tests {
             assert_eq!(backwards, all);
             assert!(forwards.lit().eq(all.lit()));
         }
+    }
+
+    #[test]
+    fn a_saved_histogram_goes_on_as_the_one_that_was() {
+        let mut h = Histogram::default();
+        states().iter().for_each(|&(v, w)| h.add(v, w));
+        h.add(f64::NEG_INFINITY, 0.3);
+        let mut back: Histogram = postcard::from_bytes(&postcard::to_stdvec(&h).unwrap()).unwrap();
+        states().iter().for_each(|&(v, w)| [&mut h, &mut back].into_iter().for_each(|h| h.add(v + 0.3, w)));
+        assert_eq!(h, back);
+        assert_eq!((h.lit, h.total()), (back.lit, back.total()));
+        assert!(h.lit().eq(back.lit()));
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::{
     path::Faults,
     rng::{Counter, Purpose, Rng},
     sample::{Move, PixelOrder, Points},
+    saved::{Unfit, expect},
 };
 
 /// Points that are evaluated together, at most.
@@ -126,6 +127,18 @@ impl<W: Default> Independent<W> {
     /// Hands over what was seen and not yet given to its group.
     pub fn settle(&mut self, canvas: &Canvas, tally: &mut Tally) {
         canvas.groups.take(self.group, tally);
+    }
+
+    /// Points of all blocks so far, and the group that the next count for: all that there is to save between sweeps.
+    pub fn saved(&self) -> (u64, usize) {
+        (self.drawn, self.group)
+    }
+
+    /// Goes on from there.
+    pub fn restore(&mut self, (drawn, group): (u64, usize)) -> Result<(), Unfit> {
+        expect(group < self.blocks, "groups of points")?;
+        (self.drawn, self.group) = (drawn, group);
+        Ok(())
     }
 
     /// From now on scalar contributions are weighed by this importance.

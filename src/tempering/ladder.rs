@@ -1,9 +1,26 @@
 //! The ladder and the acceptance of swaps on it.
 
+use serde::{Deserialize, Serialize};
+
 /// Inverse temperatures 0 = β₁ < β₂ < … < β_K = 1; for K = 1 the uniform distribution alone.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "SavedLadder")]
 pub struct Ladder {
     betas: Vec<f64>,
+}
+
+/// A ladder as it was saved, not checked yet.
+#[derive(Deserialize)]
+struct SavedLadder {
+    betas: Vec<f64>,
+}
+
+impl TryFrom<SavedLadder> for Ladder {
+    type Error = &'static str;
+
+    fn try_from(SavedLadder { betas }: SavedLadder) -> Result<Ladder, &'static str> {
+        if Ladder::allows(&betas) { Ok(Ladder { betas }) } else { Err("a ladder cannot be") }
+    }
 }
 
 impl Ladder {
@@ -19,11 +36,17 @@ impl Ladder {
     /// than 0; what people give is
     /// checked, with better words, by [`Settings`](crate::render::Settings).
     pub fn new(betas: Vec<f64>) -> Ladder {
-        assert!((1..=Ladder::LONGEST).contains(&betas.len()), "{} rungs", betas.len());
-        let last = betas[betas.len() - 1];
-        assert!(betas[0] == 0.0 && (betas.len() == 1 || last == 1.0), "from {} to {last}", betas[0]);
-        assert!(betas.windows(2).all(|pair| pair[0] < pair[1]), "inverse temperatures must rise: {betas:?}");
+        assert!(Ladder::allows(&betas), "inverse temperatures must rise from 0 to 1: {betas:?}");
         Ladder { betas }
+    }
+
+    /// Whether [`new`](Self::new) takes these inverse temperatures.
+    fn allows(betas: &[f64]) -> bool {
+        let ends = (betas.first(), betas.last());
+        (1..=Ladder::LONGEST).contains(&betas.len())
+            && ends.0 == Some(&0.0)
+            && (betas.len() == 1 || ends.1 == Some(&1.0))
+            && betas.windows(2).all(|pair| pair[0] < pair[1])
     }
 
     /// `rungs` equal steps from 0 to 1; 1 ≤ `rungs` ≤ [`LONGEST`](Self::LONGEST).

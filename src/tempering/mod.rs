@@ -30,7 +30,7 @@ mod tuning;
 mod weights;
 
 pub use agreement::{effective_samples, split_r_hat};
-pub use block::Block;
+pub use block::{Block, SavedBlock};
 pub use choices::{Choices, Combine, LadderChoice};
 pub use density::DensityOfStates;
 pub use estimate::{Estimate, uniform_mean};
@@ -43,5 +43,5 @@ pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungR
 pub use sampler::{Development, Learning, Learnt, Sampler, Setup};
 pub use stepping::stepping_stones;
 pub use steps::StepMix;
-pub use tally::{Canvas, Layers, PointGroups, PointLayer, Round, RungCounts, Sum, Tally};
+pub use tally::{Canvas, Layers, PointGroups, PointLayer, Round, RungCounts, SavedTally, Seen, Sum, Tally};
 pub use weights::Weights;

@@ -9,7 +9,10 @@
 //! that it is divided by, in the end, is that of the probe's own, which differs from the mean over all pixels by its
 //! noise only.
 
+use std::io::{self, Write};
+
 use crate::film::{Accumulator, Splat, Splats};
+use crate::saved::{Source, Unfit};
 
 /// What a chain state may count for beside a uniform point, ρ, from 0 (path tracing) on.
 pub const RATIOS: [f64; 8] = [0.0, 1.0 / 1024.0, 1.0 / 256.0, 1.0 / 64.0, 1.0 / 16.0, 1.0 / 4.0, 1.0, 4.0];
@@ -78,6 +81,22 @@ impl Probes {
     pub fn new(map: &ProbeMap, unit: f64) -> Probes {
         let film = |layers: usize| [(); 2].map(|()| Accumulator::new(map.count() as u32, 1, layers, unit));
         Probes { halves: film(2 * RATIOS.len()), trials: [(); TRIALS].map(|()| film(1)) }
+    }
+
+    /// All films, in a fixed order.
+    fn films(&self) -> impl Iterator<Item = &Accumulator> {
+        self.halves.iter().chain(self.trials.as_flattened())
+    }
+
+    /// Writes all sums.
+    pub fn save(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.films().try_for_each(|film| film.save(out))
+    }
+
+    /// Takes the sums that [`save`](Self::save) wrote.
+    pub fn restore(&mut self, from: &mut Source) -> Result<(), Unfit> {
+        let mut films = self.halves.iter_mut().chain(self.trials.as_flattened_mut());
+        films.try_for_each(|film| film.restore(from))
     }
 
     /// Splats for [`deposit`](Self::deposit).

@@ -1,5 +1,7 @@
 //! Sizes of small steps: a bank of scales, and how often each rung takes which.
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::StepLaw;
 
 /// Number of scales in the bank.
@@ -27,7 +29,7 @@ pub fn size(scale: usize) -> f64 {
 }
 
 /// Steps of one scale on one rung, mergeable by addition in any order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepCount {
     /// Σ of acceptance probabilities in units of 2⁻²⁰, each rounded.
     accepted: u64,
@@ -68,7 +70,7 @@ pub(super) fn from_fixed(sum: u64) -> f64 {
 }
 
 /// Probabilities of the scales on one rung: a bell of scales about a centre.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepMix {
     weights: [f64; SCALES],
 }

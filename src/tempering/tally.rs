@@ -3,6 +3,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     Choices, Combine, Histogram, Ladder, ProbeMap, Probes, StepMix, Weights,
     probes::TRIALS,
@@ -12,6 +14,7 @@ use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Splats},
     path::{Outcome, Whole},
+    saved::{Unfit, expect},
 };
 
 /// A layer of uniform points, of which every pixel is divided by the number of points that it got, with what points gave
@@ -110,8 +113,8 @@ pub struct Canvas<'a> {
 pub struct PointGroups(Vec<Mutex<Seen>>);
 
 /// Stratified points of one group.
-#[derive(Clone, Debug, Default)]
-struct Seen {
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Seen {
     histogram: Histogram,
     hot: Sum,
     even: Sum,
@@ -119,7 +122,7 @@ struct Seen {
 
 /// Σ of luminances that went to the balanced image, in units of 2⁻⁶⁰ of the film's, and Σ of weights that went with
 /// them, in units of 2⁻²⁰: integers, which do not depend on the order of addition.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sum {
     luminance: i128,
     weight: u128,
@@ -174,9 +177,29 @@ impl PointGroups {
         [seen.hot, seen.even]
     }
 
+    /// Adds what as many other groups saw, each to the one of its number.
+    pub fn merge(&self, other: &PointGroups) {
+        for (group, seen) in other.saved().into_iter().enumerate() {
+            let mut own = self.locked(group);
+            own.histogram.merge(&seen.histogram);
+            own.hot.merge(seen.hot);
+            own.even.merge(seen.even);
+        }
+    }
+
     /// Forgets ln g, which is about to mean something else.
     pub fn forget_histograms(&self) {
         (0..self.0.len()).for_each(|group| self.locked(group).histogram = Histogram::default());
+    }
+
+    /// What all groups saw, to be saved.
+    pub fn saved(&self) -> Vec<Seen> {
+        (0..self.0.len()).map(|group| self.locked(group).clone()).collect()
+    }
+
+    /// Groups that saw that already.
+    pub fn restored(seen: Vec<Seen>) -> PointGroups {
+        PointGroups(seen.into_iter().map(Mutex::new).collect())
     }
 
     /// The group, even if another thread panicked with it in hand.
@@ -199,7 +222,7 @@ impl Canvas<'_> {
 }
 
 /// What all blocks do in one round; fixed within it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Round {
     /// The rungs.
     pub ladder: Ladder,
@@ -219,7 +242,7 @@ pub struct Round {
 }
 
 /// Counts of one tempered rung.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RungCounts {
     /// Small steps by scale.
     pub steps: [StepCount; SCALES],
@@ -245,6 +268,16 @@ impl RungCounts {
         self.luminance += other.luminance;
         self.longest_rejection = self.longest_rejection.max(other.longest_rejection);
     }
+}
+
+/// A [`Tally`] as it is saved: between sweeps, when all its splats are on the film.
+#[derive(Serialize, Deserialize)]
+pub struct SavedTally {
+    histograms: Vec<Histogram>,
+    counts: Vec<RungCounts>,
+    hot: Sum,
+    even: Sum,
+    tempered: Sum,
 }
 
 /// What was seen since it was last emptied.
@@ -280,6 +313,28 @@ impl Tally {
             tempered: Sum::default(),
             mixtures: Vec::new(),
         }
+    }
+
+    /// All that there is to save once splats are deposited.
+    pub fn saved(&self) -> SavedTally {
+        debug_assert!(self.splats.is_empty() && self.probes.is_empty(), "splats are deposited before state is saved");
+        let Tally { histograms, counts, hot, even, tempered, .. } = self;
+        SavedTally {
+            histograms: histograms.clone(),
+            counts: counts.clone(),
+            hot: *hot,
+            even: *even,
+            tempered: *tempered,
+        }
+    }
+
+    /// Takes what was saved, of a ladder of as many rungs.
+    pub fn restore(&mut self, saved: SavedTally) -> Result<(), Unfit> {
+        let SavedTally { histograms, counts, hot, even, tempered } = saved;
+        expect([histograms.len(), counts.len()] == [self.histograms.len(); 2], "rungs")?;
+        (self.histograms, self.counts) = (histograms, counts);
+        (self.hot, self.even, self.tempered) = (hot, even, tempered);
+        Ok(())
     }
 
     /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind, where there

@@ -1,7 +1,9 @@
 //! Who travels the ladder: round trips, restarts, lineages, and the index process.
 
+use serde::{Deserialize, Serialize};
+
 /// Where a replica's state comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Origin {
     /// It was there when the ladder started.
     Start,
@@ -12,7 +14,7 @@ enum Origin {
 }
 
 /// Sums over the lineages that ended on one rung's account: Σ t and Σ t² of their dwell times there.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dwell {
     /// Σ t, sweeps.
     pub sum: u64,
@@ -22,6 +24,7 @@ pub struct Dwell {
 
 /// Travels of all replicas of a block of ladders. A *lineage* is all that descends from one uniform point that a chain
 /// took, until the next one takes its place.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Trips {
     chains: usize,
     origins: Vec<Origin>,
@@ -46,6 +49,12 @@ impl Trips {
             round_trips: 0,
             restarts: 0,
         }
+    }
+
+    /// Whether these are the travels of so many replicas on such ladders.
+    pub fn fits(&self, lanes: usize, chains: usize) -> bool {
+        let of = (self.chains, self.origins.len(), self.ages.len(), self.dwell.len());
+        of == (chains, lanes, lanes * chains, chains)
     }
 
     /// The replica spends a sweep on rung `k`, counted from 1.
@@ -80,7 +89,7 @@ impl Trips {
 }
 
 /// The rungs of a few replicas over time, thinned as it grows.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IndexProcess {
     /// Rungs of each replica, oldest first.
     pub rungs: Vec<Vec<u16>>,

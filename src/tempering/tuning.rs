@@ -14,6 +14,8 @@
 
 use std::ops::RangeInclusive;
 
+use serde::{Deserialize, Serialize};
+
 use super::probes::{EVEN, RATIOS};
 use crate::chain::Measure;
 
@@ -41,7 +43,7 @@ pub struct Measured {
 }
 
 /// What serves best.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
     /// ρ; 0 for path tracing.
     pub ratio: f64,

@@ -1,5 +1,7 @@
 //! The factors by which samples of all rungs enter one image: the balance heuristic.
 
+use serde::{Deserialize, Serialize};
+
 use super::Ladder;
 
 /// Weights of the balance heuristic, fixed for one round.
@@ -19,7 +21,7 @@ use super::Ladder;
 /// f · unit · ρ/ζ_K / (1 + ρ S), to be multiplied by Ẑ_K/unit. So the ratios of normalisers among tempered rungs are
 /// those known before the round and the one that matters most, to the uniform rung, is the final one; memory does not
 /// grow with K.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Weights {
     betas: Vec<f64>,
     /// ln ζ_k, from the second rung on.

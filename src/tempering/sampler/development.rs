@@ -98,7 +98,9 @@ impl<W: Default + Send> Planes<'_, W> {
     fn even(&self) -> Image {
         let layer = self.sampler.screen.layers.even.expect("a layer of stratified points");
         let [stratified, _] = self.sampler.points;
-        let points = self.points(layer, [stratified, 0], stratified as f64);
+        // runs go through the pixels in the same order
+        let longest = if self.sampler.longest > 0 { self.sampler.longest } else { stratified };
+        let points = self.points(layer, [longest, 0], stratified as f64);
         self.image(|i| points.of(i))
     }
 
@@ -118,7 +120,8 @@ impl<W: Default + Send> Planes<'_, W> {
         self.points(layer, [stratified - self.sampler.bootstrap, offered], self.sampler.effort)
     }
 
-    /// Of a layer with so many stratified and offered points, of weight `weight` all together.
+    /// Of a layer with so many stratified points in the order of pixels and so many offered ones, of weight `weight` all
+    /// together.
     fn points(&self, layer: PointLayer, points: [u64; 2], weight: f64) -> PointImage {
         let own = self.sampler.screen.film.layer_with(layer.own, self.pending);
         let means = PixelMeans::new(&own, points, &self.sampler.screen.footprint);
@@ -206,7 +209,7 @@ struct PixelMeans {
 
 impl PixelMeans {
     /// For what was gathered on that film: Σ of colours and of weights by pixel. `stratified` and `offered` are the numbers
-    /// of points of either kind; with a box filter a point is in one pixel.
+    /// of points of either kind, of several runs the largest of the former; with a box filter a point is in one pixel.
     fn new(sums: &[[f64; 4]], [stratified, offered]: [u64; 2], footprint: &Footprint) -> PixelMeans {
         let pixels = sums.len() as f64;
         // (1 − s/P)⁺ (1 − 1/P)^o, the share of pixels that get none

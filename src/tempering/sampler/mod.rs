@@ -8,8 +8,10 @@
 
 mod development;
 mod learnt;
+mod pooling;
 mod reporting;
 mod rounds;
+mod saved;
 
 use std::sync::Arc;
 
@@ -18,6 +20,8 @@ use rayon::prelude::*;
 pub use development::Development;
 pub use learnt::Learnt;
 use learnt::Luminance;
+
+use serde::{Deserialize, Serialize};
 
 use super::{
     Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round,
@@ -89,6 +93,11 @@ pub struct Sampler<W> {
     rays_a_point: [f64; 2],
     sweeps: u64,
     evaluations: u64,
+    /// Stratified points of the longest run that is pooled; 0 where the sampler did all itself.
+    longest: u64,
+    /// Evaluations that the run was planned for: how it is cut up and how long it learns follow from that.
+    planned: Option<u64>,
+    /// Evaluations to go through.
     wanted: Option<u64>,
     faults: Faults,
     rays: u64,
@@ -124,7 +133,7 @@ struct Portion<W> {
 }
 
 /// Where the run stands among its rounds.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Schedule {
     /// Number of the round; 0 has uniform points only.
     round: u32,
@@ -179,11 +188,7 @@ impl<W: Default + Send> Sampler<W> {
     /// Ready to start.
     pub fn new(setup: Setup) -> Sampler<W> {
         let Setup { rng, choices, footprint, size, unit, elsewhere, outcomes, evaluations } = setup;
-        let most_rungs = match &choices.ladder {
-            LadderChoice::Auto => MOST_AUTOMATIC,
-            LadderChoice::Replicas(k) => *k as usize,
-            LadderChoice::Betas(betas) => betas.len(),
-        };
+        let most_rungs = most_rungs(&choices);
         let mut plan = Plan::new(evaluations, 1);
         plan.blocks = plan.blocks.min((RUNGS_OF_ALL_BLOCKS / most_rungs).max(FEWEST_BLOCKS) & !1); // halves are compared
         let layers = Layers::of(&choices, most_rungs, elsewhere);
@@ -251,10 +256,17 @@ impl<W: Default + Send> Sampler<W> {
             effort: 0.0,
             states_a_rung: 0,
             evaluations: 0,
+            longest: 0,
+            planned: evaluations,
             wanted: evaluations,
             rays: 0,
             faults: Faults::default(),
         }
+    }
+
+    /// Changes the evaluations to go through; the run stays what it was planned as.
+    pub fn set_wanted(&mut self, evaluations: Option<u64>) {
+        self.wanted = evaluations;
     }
 
     /// Evaluations so far.
@@ -450,6 +462,15 @@ impl Screen {
             probes: self.probes.as_ref().map(|probes| (&self.map, probes)),
             groups: &self.groups,
         }
+    }
+}
+
+/// Rungs that ladders may come to have.
+fn most_rungs(choices: &Choices) -> usize {
+    match &choices.ladder {
+        LadderChoice::Auto => MOST_AUTOMATIC,
+        LadderChoice::Replicas(k) => *k as usize,
+        LadderChoice::Betas(betas) => betas.len(),
     }
 }
 

@@ -26,7 +26,7 @@ const LEARNING_ROUNDS: u32 = 5;
 /// Rounds from which on chains may be given up.
 const ROUNDS_OF_GRACE: u32 = 3;
 /// Lanes that are evaluated together; a ladder longer than that is cut into parts.
-const LANES_A_PART: usize = 512;
+pub(super) const LANES_A_PART: usize = 512;
 /// Rungs are placed anew where the rejections that the density of states predicts differ by more.
 const UNEQUAL_REJECTION: f64 = 0.05;
 /// Uniform points that a chain should take over a sweep, if offers are to be had: it then forgets its past as fast as
@@ -109,7 +109,7 @@ impl<W: Default + Send> Sampler<W> {
         self.screen.groups.forget_histograms();
         let a_sweep = self.a_sweep();
         self.schedule.length =
-            self.schedule.done + at_most(super::BOOTSTRAP, self.wanted, 1.0 / 32.0).div_ceil(a_sweep);
+            self.schedule.done + at_most(super::BOOTSTRAP, self.planned, 1.0 / 32.0).div_ceil(a_sweep);
     }
 
     /// Records what states have gathered; the round's settings still hold.
@@ -182,7 +182,7 @@ impl<W: Default + Send> Sampler<W> {
         let chains = ladder.chains();
         self.ln_unit = learnt.normalisers.target.ln_value;
         self.offers = 1;
-        let remaining = self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations));
+        let remaining = self.planned.map(|wanted| wanted.saturating_sub(self.evaluations));
         let ladders = self.plan.groups_a_block(remaining, 2 * chains);
         let samples: Vec<Start> =
             self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
@@ -314,7 +314,8 @@ impl<W: Default + Send> Sampler<W> {
     /// Whether what is learnt now is the last.
     fn is_last_lesson(&self) -> bool {
         let next = self.evaluations as f64 + 2.0 * (self.schedule.length * self.a_sweep()) as f64;
-        self.schedule.round >= LEARNING_ROUNDS || self.wanted.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
+        self.schedule.round >= LEARNING_ROUNDS
+            || self.planned.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
     }
 
     /// The weights and the share that serve best, where they are free.
@@ -451,7 +452,7 @@ impl<W: Default + Send> Sampler<W> {
                 let first = FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels);
                 // both halves need a stratified point in every pixel
                 let passes = if self.open { (2.0 * pixels as f64 / self.uniform_share()) as u64 } else { 0 };
-                at_most(first, self.wanted, LEARNING_PART / 4.0).max(at_most(passes, self.wanted, LEARNING_PART))
+                at_most(first, self.planned, LEARNING_PART / 4.0).max(at_most(passes, self.planned, LEARNING_PART))
             }
             (_, false) => 2 * self.schedule.evaluations,
             // as long as all that came before

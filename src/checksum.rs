@@ -1,6 +1,6 @@
 //! Numbers that are others when something has changed: against accidents, not against malice.
 
-use std::fmt;
+use std::{fmt, io};
 
 use crate::scene::SceneDescription;
 
@@ -30,6 +30,42 @@ impl Checksum {
     /// The number.
     pub fn finish(self) -> u32 {
         self.0.finalize()
+    }
+}
+
+/// Writes on, and takes the checksum of all that comes by.
+pub struct Summed<W> {
+    to: W,
+    sum: Checksum,
+}
+
+impl<W: io::Write> Summed<W> {
+    /// Nothing came by yet.
+    pub fn new(to: W) -> Summed<W> {
+        Summed { to, sum: Checksum::default() }
+    }
+
+    /// Writes the checksum of everything before as four bytes, little-endian.
+    pub fn seal(mut self) -> io::Result<()> {
+        let sum = self.sum.finish();
+        self.to.write_all(&sum.to_le_bytes())
+    }
+
+    /// The checksum of everything that came by.
+    pub fn finish(self) -> u32 {
+        self.sum.finish()
+    }
+}
+
+impl<W: io::Write> io::Write for Summed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.to.write(bytes)?;
+        self.sum.add(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
     }
 }
 
