@@ -63,6 +63,7 @@ fn killed_and_finished(folder: &Path, scene: &str, options: &[&str], at: &[u64])
 fn a_run_that_is_killed_again_and_again_comes_to_the_same_bits() {
     for (scene, options) in [
         ("lattice", &["--method", "re", "--mapping", "bidirectional", "--replicas", "4", "--layers"][..]),
+        ("caustic", &["--method", "re", "--mapping", "multiplexed", "--replicas", "3"]),
         ("caustic", &["--method", "re"]),
         ("cornell-box", &["--method", "mlt", "--normalisation", "pooled", "--kelemen-weights", "--mapping", "two-way"]),
         ("caustic", &["--method", "mlt", "--mapping", "multiplexed", "--technique-changes", "on"]),

@@ -29,6 +29,7 @@ fn merged_parts_are_the_job_in_one_process() {
         ("cornell-box", &["--method", "re", "--mapping", "two-way"]),
         ("caustic", &["--method", "mlt", "--kelemen-weights", "--normalisation", "pooled"]),
         ("lattice", &["--method", "path", "--mapping", "bidirectional"]),
+        ("caustic", &["--method", "re", "--mapping", "multiplexed"]),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let options = [options, &["--seed", "7", "--mpp", "150"]].concat();
