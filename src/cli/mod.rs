@@ -10,6 +10,7 @@ mod reference;
 mod render;
 mod scene;
 mod signals;
+mod stress;
 mod study;
 mod values;
 
@@ -35,6 +36,7 @@ enum Command {
     Compare(compare::Compare),
     Reference(Box<reference::Reference>),
     Convert(convert::Convert),
+    Stress(stress::Stress),
 }
 
 const EXIT_CODES: &str = "\
@@ -45,6 +47,7 @@ Exit codes:
        relt convert: also with --strict where something would be left out
   3    relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
+       relt stress: a case failed
   130  ended at once by a second signal, without an image
        relt reference, relt study: also by the first, before all was done; the same command goes on";
 
@@ -66,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Reference(arguments) => reference::run(*arguments),
         Command::Convert(arguments) => convert::run(arguments),
+        Command::Stress(arguments) => stress::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
