@@ -27,6 +27,24 @@ pub struct Way {
     pub settings: Settings,
 }
 
+/// What a mean should be.
+#[derive(Clone, Copy, Debug)]
+pub struct Goal {
+    /// The mean.
+    pub expected: f64,
+    /// By what part of it rounding may change it.
+    pub rounding: f64,
+    /// By what part of it it is to be known at least.
+    pub precision: f64,
+}
+
+impl Goal {
+    /// A mean with the rounding that all images are allowed.
+    pub fn new(expected: f64, precision: f64) -> Goal {
+        Goal { expected, rounding: ROUNDING, precision }
+    }
+}
+
 /// How many runs there are of what is compared by means, and how long they are.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -90,20 +108,29 @@ impl Bench {
             .collect()
     }
 
-    /// Checks that the mean luminance of a scene is `expected` by all ways that make all of its light, and that no
+    /// Checks that the mean luminance of a scene is as it should be by all ways that make all of its light, and that no
     /// contribution was other than a number.
-    pub fn all_ways_give(&self, scene: &Scene, expected: f64, effort: Effort, precision: f64) -> Vec<Check> {
-        self.ways(scene).iter().flat_map(|way| self.gives(scene, way, expected, effort, precision)).collect()
+    pub fn all_ways_give(&self, scene: &Scene, goal: Goal, effort: Effort) -> Vec<Check> {
+        self.ways_give(scene, &self.ways(scene), goal, effort)
     }
 
-    /// The same for one way.
-    pub fn gives(&self, scene: &Scene, way: &Way, expected: f64, effort: Effort, precision: f64) -> [Check; 2] {
-        let outcomes = self.runs(scene, way, effort);
-        [
-            Check::mean(format!("mean by {}", way.name), &means(&outcomes), expected, ROUNDING, precision),
-            Check::none(format!("paths that are no numbers by {}", way.name), non_finite(&outcomes)),
-        ]
+    /// The same by some ways.
+    pub fn ways_give(&self, scene: &Scene, ways: &[Way], goal: Goal, effort: Effort) -> Vec<Check> {
+        let of_way = |way: &Way| {
+            let outcomes = self.runs(scene, way, effort);
+            let Goal { expected, rounding, precision } = goal;
+            [
+                Check::mean(format!("mean by {}", way.name), &means(&outcomes), expected, rounding, precision),
+                Check::none(format!("paths that are no numbers by {}", way.name), non_finite(&outcomes)),
+            ]
+        };
+        ways.iter().flat_map(of_way).collect()
     }
+}
+
+/// All methods on camera paths.
+pub fn camera_ways() -> Vec<Way> {
+    Method::ALL.map(|method| way(method, MappingKind::Unidirectional)).into()
 }
 
 /// A method on a mapping, on one thread, without calibration.

@@ -7,7 +7,7 @@
 
 use super::{
     Bench, Case, Check,
-    bench::{Effort, described, way},
+    bench::{Effort, Goal, described, way},
     scenes::{diffuse, glowing, integrating_sphere, room, series, sphere, view},
 };
 use crate::path::MappingKind;
@@ -74,7 +74,7 @@ fn of_unit(bench: &Bench, unit: f64, distance: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     for ((elements, expected), name) in scenes(unit, distance).into_iter().zip(["room", "sphere"]) {
         let scene = bench.scene(&elements);
-        checks.extend(bench.all_ways_give(&scene, expected, EFFORT, 0.3).into_iter().map(|check| check.of(name)));
+        checks.extend(bench.all_ways_give(&scene, Goal::new(expected, 0.3), EFFORT).into_iter().map(|check| check.of(name)));
     }
     checks
 }

@@ -74,3 +74,12 @@ pub fn series(albedo: f64, n: i32) -> f64 {
 pub fn integrating_sphere(albedo: f64, r: f64, n: i32) -> f64 {
     albedo * r * r * series(albedo * (1.0 - r * r), n - 1)
 }
+
+/// A rectangle of half the size `half`, in the plane z = 0 and facing up, turned, then moved, with something.
+pub fn rectangle([x, y]: [f64; 2], turn: &str, place: [f64; 3], with: &str) -> String {
+    format!(
+        "<shape type='rectangle'><transform name='to_world'><scale x='{x}' y='{y}'/>{turn}<translate value='{}'/></transform>
+           {with}</shape>",
+        point(place)
+    )
+}
