@@ -9,10 +9,11 @@ use std::time::Duration;
 use clap::Args;
 
 use super::failure::Failure;
-use super::scene::SceneArguments;
+use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::path::MappingKind;
 use crate::render::log::{self, Log};
+use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::settings::DEFAULT_MUTATIONS_PER_PIXEL;
 use crate::render::{
@@ -129,14 +130,25 @@ pub(super) struct Render {
     packet: PacketChoice,
 }
 
+/// Memory of a film from which on it is told at the start.
+const WORTH_TELLING: u64 = 1 << 30;
+
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let output = arguments.output()?;
-    let opened = arguments.scene.open(arguments.threads, arguments.quiet)?;
+    let description = arguments.scene.describe(arguments.threads, arguments.quiet)?;
+    let memory = FilmMemory::of(&description.film, &settings);
+    if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
+        return Err(Failure::input(fault));
+    }
+    let opened = Opened::of(description, arguments.threads, arguments.quiet)?;
     let log = arguments.log.as_deref().map(Log::create).transpose().map_err(Failure::input)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());
+    if memory.most >= WORTH_TELLING {
+        progress.say(&format!("film: {}", memory.in_words()));
+    }
     for warning in &opened.warnings {
         progress.say(&format!("warning: {warning}"));
     }

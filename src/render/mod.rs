@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod clock;
 pub mod engine;
 pub mod log;
+pub mod memory;
 pub mod output;
 pub mod progress;
 mod replica_exchange;

@@ -4,7 +4,7 @@ use super::{
     Bench, Case, Check,
     bench::{Effort, Goal, camera_ways},
     check::ROUNDING,
-    scenes::{SKY, diffuse, film, glowing, integrating_sphere, rectangle, series, sphere, view},
+    scenes::{SKY, diffuse, film, glowing, integrating_sphere, rectangle, series, sphere, view, without_roulette},
 };
 
 const ALBEDO: f64 = 0.5;
@@ -30,10 +30,9 @@ pub(super) fn cases() -> Vec<Case> {
     cases.push(
         Case::new(
             "light/keyhole",
-            "the sky through a square hole of 1/400 of a lid lights the floor below by Lambert's formula",
+            "the sky through a square hole of 1/100 of a lid lights the floor below by Lambert's formula",
             keyhole,
-        )
-        .quick_if(false),
+        ),
     );
     cases.push(Case::new(
         "light/nearly-closed",
@@ -74,7 +73,7 @@ fn point(bench: &Bench) -> Vec<Check> {
 /// lit only.
 fn keyhole(bench: &Bench) -> Vec<Check> {
     /// Half the width of the hole.
-    const HOLE: f64 = 0.05;
+    const HOLE: f64 = 0.1;
     /// Half the width of what is seen.
     const SEEN: f64 = 0.005;
     let black = diffuse(0.0);
@@ -117,14 +116,13 @@ fn keyhole(bench: &Bench) -> Vec<Check> {
 fn nearly_closed(bench: &Bench) -> Vec<Check> {
     const EDGES: i32 = 1000;
     const LOST: f64 = 1e-5;
-    let text = from_inside(EDGES).replace("name='rr_depth' value='100'", "name='rr_depth' value='2000'");
     let scene = bench.scene(
-        &(text
+        &(without_roulette(&from_inside(EDGES))
             + &sphere(CENTER, 1.0, true, &(diffuse(1.0) + &glowing(1.0)))
             + &sphere(CENTER, LOST.sqrt(), false, &diffuse(0.0))),
     );
     let goal = Goal { expected: series(1.0 - LOST, EDGES), rounding: long_rounding(EDGES), precision: 0.1 };
-    bench.ways_give(&scene, &camera_ways(), goal, Effort { runs: 16, mutations_per_pixel: 4.0 })
+    bench.ways_give(&scene, &camera_ways(), goal, Effort { runs: 16, mutations_per_pixel: 1.0 })
 }
 
 /// Rounding of paths of that many edges, each of which multiplies the throughput and adds to the sum.

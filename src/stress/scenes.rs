@@ -16,6 +16,11 @@ pub fn view(unit: f64, [origin, target]: [[f64; 3]; 2], fov: f64, max_depth: i32
     )
 }
 
+/// The same view without roulette.
+pub fn without_roulette(view: &str) -> String {
+    view.replace("name='rr_depth' value='100'", "name='rr_depth' value='16000'")
+}
+
 /// A film with a box filter.
 pub fn film(width: u32, height: u32) -> String {
     format!(
