@@ -171,7 +171,10 @@ mod tests {
             let before = everything(unit).largest_coordinate();
             let after = everything(unit).in_fit_units().largest_coordinate();
             assert!(after <= f32::max(largest, before), "{unit}: {after}");
-            assert!(if before < SMALL { (1.0..2.0).contains(&after) } else { after == before }, "{unit}: {before}, {after}");
+            assert!(
+                if before < SMALL { (1.0..2.0).contains(&after) } else { after == before },
+                "{unit}: {before}, {after}"
+            );
         }
     }
 }

@@ -91,7 +91,8 @@ impl Bench {
         use {MappingKind::*, Method::*};
         let all = Method::ALL.into_iter().flat_map(|method| MappingKind::ALL.map(|mapping| (method, mapping)));
         let wanted = |(method, mapping): &(Method, MappingKind)| {
-            let in_quick = [(Path, Light), (Path, Unidirectional), (Mlt, Multiplexed), (ReplicaExchange, Bidirectional)];
+            let in_quick =
+                [(Path, Light), (Path, Unidirectional), (Mlt, Multiplexed), (ReplicaExchange, Bidirectional)];
             mapping.misses(&scene.features).is_empty() && (!self.quick || in_quick.contains(&(*method, *mapping)))
         };
         all.filter(wanted).map(|(method, mapping)| way(method, mapping)).collect()

@@ -69,7 +69,8 @@ impl Check {
     /// A number that should be `expected` within `tolerance`.
     pub fn about(quantity: impl Into<String>, expected: f64, got: f64, tolerance: f64) -> Check {
         // a NaN anywhere is a failure
-        let verdict = if (got - expected).abs() <= tolerance || got == expected { Verdict::Pass } else { Verdict::Fail };
+        let verdict =
+            if (got - expected).abs() <= tolerance || got == expected { Verdict::Pass } else { Verdict::Fail };
         Check { quantity: quantity.into(), relation: Relation::About, expected, got, tolerance, verdict }
     }
 

@@ -22,7 +22,9 @@ pub(super) fn cases() -> Vec<Case> {
         cases.push(
             Case::new(
                 format!("film/{width}x{height}"),
-                format!("a glowing sphere looks like Σ aⁱ on {width} × {height} pixels, through filters wider than that"),
+                format!(
+                    "a glowing sphere looks like Σ aⁱ on {width} × {height} pixels, through filters wider than that"
+                ),
                 move |bench| of_size(bench, width, height),
             )
             .quick_if((width, height) == (1, 1)),

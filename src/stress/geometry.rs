@@ -60,7 +60,8 @@ pub(super) fn cases() -> Vec<Case> {
             camera_in_glass,
         )
         .quick(),
-        Case::new("geometry/camera-on-wall", "a camera on the wall of a glowing sphere sees Σ aⁱ", camera_on_wall).quick(),
+        Case::new("geometry/camera-on-wall", "a camera on the wall of a glowing sphere sees Σ aⁱ", camera_on_wall)
+            .quick(),
     ]
 }
 

@@ -26,14 +26,13 @@ pub(super) fn cases() -> Vec<Case> {
             .quick_if(radius == 1e-6),
         );
     }
-    cases.push(Case::new("light/point", "a point of intensity 1 lights the sphere about it by a/π Σ aⁱ", point).quick());
-    cases.push(
-        Case::new(
-            "light/keyhole",
-            "the sky through a square hole of 1/100 of a lid lights the floor below by Lambert's formula",
-            keyhole,
-        ),
-    );
+    cases
+        .push(Case::new("light/point", "a point of intensity 1 lights the sphere about it by a/π Σ aⁱ", point).quick());
+    cases.push(Case::new(
+        "light/keyhole",
+        "the sky through a square hole of 1/100 of a lid lights the floor below by Lambert's formula",
+        keyhole,
+    ));
     cases.push(Case::new(
         "light/nearly-closed",
         "a white sphere that glows and that light leaves with probability 10⁻⁵ a bounce looks like Σ (1 − 10⁻⁵)ⁱ, i < 1000",

@@ -11,15 +11,20 @@ use crate::tempering::Histogram;
 /// The cases.
 pub(super) fn cases() -> Vec<Case> {
     vec![
-        Case::new("long-runs/film", "after 10¹² splats of 1 a pixel takes a million more without losing any of them", film)
-            .quick(),
+        Case::new(
+            "long-runs/film",
+            "after 10¹² splats of 1 a pixel takes a million more without losing any of them",
+            film,
+        )
+        .quick(),
         Case::new(
             "long-runs/histogram",
             "a histogram of ln g holds 10¹² states in one bin, and a million more, and its powers sum to as much",
             histogram,
         )
         .quick(),
-        Case::new("long-runs/plan", "budgets of 10¹⁵ mutations and of 300 days make sense and are planned for", plan).quick(),
+        Case::new("long-runs/plan", "budgets of 10¹⁵ mutations and of 300 days make sense and are planned for", plan)
+            .quick(),
     ]
 }
 

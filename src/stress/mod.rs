@@ -42,7 +42,11 @@ pub const GROUPS: [Group; 9] = [
     Group { name: "scale", subject: "units of length, and distance from the origin", cases: scale::cases },
     Group { name: "radiance", subject: "units of light, and its range within one image", cases: radiance::cases },
     Group { name: "light", subject: "small, hidden and point-like lights", cases: light_size::cases },
-    Group { name: "materials", subject: "limits of roughness, refraction, albedo and path length", cases: materials::cases },
+    Group {
+        name: "materials",
+        subject: "limits of roughness, refraction, albedo and path length",
+        cases: materials::cases,
+    },
     Group { name: "geometry", subject: "coincident, thin, degenerate and many triangles", cases: geometry::cases },
     Group { name: "ladder", subject: "ladders and targets of all shapes", cases: ladder::cases },
     Group { name: "long-runs", subject: "sums and counters after a very long time", cases: long_runs::cases },
@@ -63,7 +67,11 @@ pub struct Case {
 
 impl Case {
     /// A case of the full suite.
-    fn new(name: impl Into<String>, statement: impl Into<String>, run: impl Fn(&Bench) -> Vec<Check> + 'static) -> Case {
+    fn new(
+        name: impl Into<String>,
+        statement: impl Into<String>,
+        run: impl Fn(&Bench) -> Vec<Check> + 'static,
+    ) -> Case {
         Case { name: name.into(), statement: statement.into(), quick: false, run: Box::new(run) }
     }
 

@@ -94,7 +94,8 @@ fn metropolis(bench: &Bench) -> Vec<Check> {
         for (name, power) in FACTORS {
             let factor = 2f64.powi(power);
             let scaled = run(factor);
-            let differences = pixels(&as_it_is, 1.0).into_iter().zip(pixels(&scaled, factor)).map(|(a, b)| (a - b).abs());
+            let differences =
+                pixels(&as_it_is, 1.0).into_iter().zip(pixels(&scaled, factor)).map(|(a, b)| (a - b).abs());
             // ten thousand splats, each rounded to f32 from weights that differ in the last digits of f64
             let most = 1e-6 * mean;
             checks.push(Check::at_most(

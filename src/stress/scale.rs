@@ -57,8 +57,7 @@ fn scenes(unit: f64, distance: f64) -> [(String, f64); 2] {
     let [eye, target] = [place([0.5, 0.3, -0.2]), place([0.9, 0.1, -0.5])];
     [
         (
-            view(unit, [eye, target], 80.0, EDGES)
-                + &room(center, unit, &(diffuse(ALBEDO) + &glowing(1.0))),
+            view(unit, [eye, target], 80.0, EDGES) + &room(center, unit, &(diffuse(ALBEDO) + &glowing(1.0))),
             series(ALBEDO, EDGES),
         ),
         (
@@ -74,7 +73,9 @@ fn of_unit(bench: &Bench, unit: f64, distance: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     for ((elements, expected), name) in scenes(unit, distance).into_iter().zip(["room", "sphere"]) {
         let scene = bench.scene(&elements);
-        checks.extend(bench.all_ways_give(&scene, Goal::new(expected, 0.3), EFFORT).into_iter().map(|check| check.of(name)));
+        checks.extend(
+            bench.all_ways_give(&scene, Goal::new(expected, 0.3), EFFORT).into_iter().map(|check| check.of(name)),
+        );
     }
     checks
 }
