@@ -68,3 +68,20 @@ fn files_that_cannot_be_written_are_known_before() {
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
 }
+
+/// 60,000² pixels in five layers would take more than a terabyte.
+#[test]
+#[cfg(target_os = "linux")]
+fn films_that_cannot_be_had_are_refused_before_anything_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>
+        <integer name='width' value='60000'/><integer name='height' value='60000'/></film></sensor>
+        <emitter type='constant'/></scene>";
+    std::fs::write(folder.path().join("large.xml"), scene).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_relt"));
+    let output = command.args(["render", "large.xml", "-o", "a.exr"]).current_dir(folder.path()).output().unwrap();
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("the film is too large: 60000 × 60000 pixels in 5 layers take 1152.0 GB"), "{message}");
+    assert!(!folder.path().join("a.exr").exists());
+}

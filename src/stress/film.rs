@@ -13,7 +13,7 @@ use crate::scene::description::FilmDescription;
 const ALBEDO: f64 = 0.5;
 const EDGES: i32 = 4;
 /// Mutations of a run.
-const MUTATIONS: f64 = 8192.0;
+const MUTATIONS: f64 = 16384.0;
 
 /// The cases.
 pub(super) fn cases() -> Vec<Case> {
@@ -44,7 +44,9 @@ pub(super) fn cases() -> Vec<Case> {
 
 /// A glowing sphere from inside, through that film.
 fn scene(bench: &Bench, film: &str) -> crate::scene::Scene {
-    let text = view(1.0, [[0.5, 0.3, -0.2], [0.9, 0.1, -0.5]], 80.0, EDGES).replace(&scenes::film(12, 8), film);
+    let text = view(1.0, [[0.5, 0.3, -0.2], [0.9, 0.1, -0.5]], 80.0, EDGES)
+        .replace(&scenes::film(12, 8), film)
+        .replace("<sensor type='perspective'>", "<sensor type='perspective'><string name='fov_axis' value='larger'/>");
     bench.scene(&(text + &sphere([0.0; 3], 1.0, true, &(diffuse(ALBEDO) + &glowing(1.0)))))
 }
 

@@ -54,6 +54,9 @@ pub const GROUPS: [Group; 9] = [
     Group { name: "machine", subject: "threads, instruction sets, denormal numbers", cases: machine::cases },
 ];
 
+/// Makes the checks of a case.
+type Run = Box<dyn Fn(&Bench) -> Vec<Check>>;
+
 /// One case.
 pub struct Case {
     /// Name, of the form `group/what`.
@@ -62,7 +65,7 @@ pub struct Case {
     pub statement: String,
     /// Part of the quick suite, which takes less than a minute.
     pub quick: bool,
-    run: Box<dyn Fn(&Bench) -> Vec<Check>>,
+    run: Run,
 }
 
 impl Case {
