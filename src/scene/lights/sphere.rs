@@ -176,7 +176,7 @@ mod tests {
                 let d = local.as_dvec3().normalize();
                 let (r, to) = (f64::from(radius), glam::DVec3::Z * f64::from(distance));
                 let along = d.dot(to);
-                let half_chord = (r * r - to.length_squared() + along * along).max(0.0).sqrt();
+                let half_chord = (r * r - (to.z * d.truncate().length()).powi(2)).max(0.0).sqrt();
                 let expected = (d * (along - half_chord) - to) / r;
                 let normal = frame.to_local(sphere.outside(&frame, local, distance)).as_dvec3();
                 // near the rim the cosine is the root of a small difference
