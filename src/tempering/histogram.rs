@@ -35,7 +35,8 @@ struct Bin {
     moment: i128,
 }
 
-const BINS_PER_NAT: i64 = 64;
+/// Bins of a nat.
+pub(super) const BINS_PER_NAT: i64 = 64;
 /// Steps of a weight of 1.
 const WEIGHT_STEPS: f64 = (1u64 << 24) as f64;
 /// Steps of a moment of 1 nat.

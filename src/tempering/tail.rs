@@ -1,6 +1,6 @@
 //! Whether uniform points are so unevenly bright that the spread of what was seen says nothing of what was not.
 
-use super::Histogram;
+use super::{Histogram, histogram::BINS_PER_NAT};
 
 /// The tail of the distribution of g over uniform points: P(g > t) falls about as t^(−1/k) for the largest t.
 ///
@@ -49,7 +49,8 @@ fn index_of_largest(bins: &[(f64, f64)], wanted: f64) -> Option<(f64, f64)> {
         above += weight;
         sum += weight * ln_g;
         if above >= wanted {
-            return (above >= FEWEST).then(|| (sum / above - ln_g, above));
+            // the values begin at the lower edge of their darkest bin, not at its mean
+            return (above >= FEWEST).then(|| (sum / above - ln_g + 0.5 / BINS_PER_NAT as f64, above));
         }
     }
     None
