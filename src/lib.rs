@@ -8,8 +8,8 @@
 //! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
 //! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines; [`convert`] makes such files
-//! of other renderers' scenes; [`study`] draws what runs
-//! leave behind.
+//! of other renderers' scenes; [`study`] draws what runs leave behind; [`stress`] checks all of it at the ends of what
+//! numbers can be.
 //!
 //! ```standalone_crate
 //! use std::{path::Path, sync::atomic::AtomicBool};
@@ -41,5 +41,6 @@ pub mod rng;
 pub mod sample;
 pub mod saved;
 pub mod scene;
+pub mod stress;
 pub mod study;
 pub mod tempering;

@@ -13,6 +13,7 @@ mod replay;
 mod run_options;
 mod scene;
 mod signals;
+mod stress;
 mod study;
 mod values;
 
@@ -40,6 +41,7 @@ enum Command {
     Compare(compare::Compare),
     Reference(Box<reference::Reference>),
     Convert(convert::Convert),
+    Stress(stress::Stress),
 }
 
 const EXIT_CODES: &str = "\
@@ -51,6 +53,7 @@ Exit codes:
   3    relt render --strict: the picture cannot be trusted
        relt compare: an image exceeds a --max-… that was given
        relt reference: --time was over before --target-relmse was reached
+       relt stress: a case failed
   130  ended at once by a second signal, without an image
        relt reference, relt study: also by the first, before all was done; the same command goes on";
 
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Reference(arguments) => reference::run(*arguments),
         Command::Convert(arguments) => convert::run(arguments),
+        Command::Stress(arguments) => stress::run(arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

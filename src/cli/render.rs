@@ -14,6 +14,7 @@ use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::film::file::{FileError, check_writable};
 use crate::render::log::{self, Log};
+use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::{
     self, Checkpoint, Health, Job, Observer, Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status,
@@ -92,6 +93,9 @@ pub(super) struct Render {
     packet: PacketChoice,
 }
 
+/// Memory of a film from which on it is told at the start.
+const WORTH_TELLING: u64 = 1 << 30;
+
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let keep = arguments.keep();
@@ -105,6 +109,10 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     // from now on, also while the scene is read, the signal is no longer the end
     let asked = keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
     let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
+    let memory = FilmMemory::of(&description.film, &settings);
+    if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
+        return Err(Failure::input(fault));
+    }
     let is_kept = keep.is_some() || resumed.is_some();
     let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
     resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
@@ -118,6 +126,9 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let stop = signals::stop_flag()?;
     let progress = Progress::new(arguments.verbosity(), stop.clone());
     let arithmetic = resumed.as_ref().map(|resumed| elsewhere(resumed, &opened)).transpose()?.flatten();
+    if memory.most >= WORTH_TELLING {
+        progress.say(&format!("film: {}", memory.in_words()));
+    }
     for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
         progress.say(&format!("warning: {warning}"));
     }

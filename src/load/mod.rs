@@ -39,6 +39,12 @@ pub fn watched(path: &Path, defines: &[(String, String)], watch: &Watch) -> Resu
     read(path, text, defines, watch)
 }
 
+/// Reads the text of a scene file that would be at `path`, without looking there; files that it names are looked for in
+/// that folder.
+pub fn text(path: &Path, text: String) -> Result<SceneDescription, LoadError> {
+    reader(path)?(path, text, &[], &Watch::default())
+}
+
 /// The reader of the format that the file name's extension stands for.
 fn reader(path: &Path) -> Result<Reader, LoadError> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod engine;
 pub mod health;
 pub mod log;
+pub mod memory;
 mod merge;
 pub mod output;
 pub mod parts;

@@ -12,7 +12,7 @@ use super::{
     Profile,
     materials::{Evaluation, Inverse, Lobes, Material, Null, Scatter, ScatterSample},
     parametrisation::Place,
-    relief::{Relief, Tilt},
+    relief::{Relief, ReliefKind, Tilt},
     textures::{Texture, Varying, scalar},
 };
 use crate::math::Frame;
@@ -100,6 +100,15 @@ impl Appearance {
     /// As much of it as `opacity` says, with nothing in between.
     pub fn masked(self, opacity: Varying) -> Appearance {
         Appearance::from(Material::Null(Null)).blend(self, opacity)
+    }
+
+    /// Multiplies heights of reliefs, for surfaces that become as much larger.
+    pub fn scale_heights(&mut self, factor: f32) {
+        for relief in self.parts.iter_mut().filter_map(|part| part.relief.as_mut()) {
+            if let ReliefKind::Heights { scale } = &mut relief.kind {
+                *scale *= factor;
+            }
+        }
     }
 
     /// With bent normals; `None` where a part has some already.

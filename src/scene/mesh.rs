@@ -26,6 +26,11 @@ impl Mesh {
         Mesh { positions, normals: Vec::new(), uvs: Vec::new(), triangles }
     }
 
+    /// Multiplies all positions.
+    pub fn scale(&mut self, factor: f32) {
+        self.positions.iter_mut().for_each(|p| *p *= factor);
+    }
+
     /// Vertex positions, without the padding.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions[..self.positions.len() - 1]

@@ -14,6 +14,7 @@ pub mod mesh;
 pub mod parameters;
 mod parametrisation;
 pub mod relief;
+mod scaling;
 mod surface;
 pub mod textures;
 
@@ -70,6 +71,7 @@ impl Scene {
         description: SceneDescription,
         watch: &(dyn Fn(f64) + Sync),
     ) -> Result<Scene, embree::EmbreeError> {
+        let description = description.in_fit_units();
         let features = Features::of(&description);
         let groups = instances::trace_groups(device, &description.groups)?;
         let mut geometries = geometries(&description.shapes);

@@ -11,11 +11,10 @@ use serde::{Deserialize, Serialize};
 ///
 /// Sums are integers, so that merging gives the same bits in any order and for any split into batches: weights in steps
 /// of 2⁻²⁴, moments in steps of 2⁻³⁰ nat. Each addition is rounded to the nearest step, an error of at most 3·10⁻⁸ in
-/// the weight (a state counts for about 1) and of 5·10⁻¹⁰/weight nat in the mean. A bin holds a weight of 2³⁹ =
-/// 5.5·10¹¹ and stays there, full (its moment cannot overflow earlier: it is at most 2³⁹ · 2⁻⁷ · 2³⁰ = 2⁶² steps, and the
-/// roundings' share another 2⁶² only after 2⁶³ additions).
+/// the weight (a state counts for about 1) and of 5·10⁻¹⁰/weight nat in the mean. Sums have 128 bits: with 64, bins were
+/// full at 5.5·10¹¹, which a long run reaches where g is the same nearly everywhere, and Z fell from then on.
 ///
-/// Bins are kept in pages of one nat, made when a state comes. ±700 nats, filled, are 1.4 MB; a single absurd value is
+/// Bins are kept in pages of one nat, made when a state comes. ±700 nats, filled, are 2.9 MB; a single absurd value is
 /// one page; beyond ±16,384 nats ln g is taken as that, so the directory of pages never exceeds 256 kB.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(into = "SavedHistogram", try_from = "SavedHistogram")]
@@ -26,7 +25,7 @@ pub struct Histogram {
     /// Weight of lit states, in steps; kept so that asking for it costs nothing.
     lit: i128,
     /// Weight of dark states, in steps.
-    dark: i64,
+    dark: i128,
 }
 
 type Page = [Bin; BINS_PER_NAT as usize];
@@ -34,12 +33,13 @@ type Page = [Bin; BINS_PER_NAT as usize];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Bin {
     /// Σ weight, in steps.
-    weight: i64,
+    weight: i128,
     /// Σ weight · (ln g − centre of the bin), in steps.
-    moment: i64,
+    moment: i128,
 }
 
-const BINS_PER_NAT: i64 = 64;
+/// Bins of a nat.
+pub(super) const BINS_PER_NAT: i64 = 64;
 /// Steps of a weight of 1.
 const WEIGHT_STEPS: f64 = (1u64 << 24) as f64;
 /// Steps of a moment of 1 nat.
@@ -75,15 +75,15 @@ impl Histogram {
         let page = number.div_euclid(BINS_PER_NAT);
         self.lit += i128::from(steps);
         let bin = &mut self.page(page)[number.rem_euclid(BINS_PER_NAT) as usize];
-        bin.weight = bin.weight.saturating_add(steps);
-        bin.moment = bin.moment.saturating_add((moment + 0.5f64.copysign(moment)) as i64);
+        bin.weight += i128::from(steps);
+        bin.moment += i128::from((moment + 0.5f64.copysign(moment)) as i64);
     }
 
     /// Adds the weight of dark states, which may be taken away again: states of weights that sum to 1 only on average are
     /// lit in part, and what is left of 1 is dark, be it less than nothing.
     #[inline(always)]
     pub fn add_dark(&mut self, weight: f64) {
-        self.dark = self.dark.saturating_add((weight * WEIGHT_STEPS).round() as i64);
+        self.dark += i128::from((weight * WEIGHT_STEPS).round() as i64);
     }
 
     /// The page of that number, made if need be.
@@ -116,12 +116,12 @@ impl Histogram {
     /// Adds all of another histogram's weights.
     pub fn merge(&mut self, other: &Histogram) {
         self.lit += other.lit;
-        self.dark = self.dark.saturating_add(other.dark);
+        self.dark += other.dark;
         for (i, theirs) in other.pages.iter().enumerate() {
             let Some(theirs) = theirs else { continue };
             for (bin, more) in self.page(other.first + i as i64).iter_mut().zip(theirs.iter()) {
-                bin.weight = bin.weight.saturating_add(more.weight);
-                bin.moment = bin.moment.saturating_add(more.moment);
+                bin.weight += more.weight;
+                bin.moment += more.moment;
             }
         }
     }
@@ -156,7 +156,7 @@ impl Histogram {
 
     /// Weight of all states.
     pub fn total(&self) -> f64 {
-        (self.lit + i128::from(self.dark)) as f64 / WEIGHT_STEPS
+        (self.lit + self.dark) as f64 / WEIGHT_STEPS
     }
 
     /// Mean and standard deviation of ln g over lit states (without the spread within bins, at most 1/128 nat);
@@ -180,9 +180,9 @@ impl Histogram {
 #[derive(Serialize, Deserialize)]
 struct SavedHistogram {
     lit: i128,
-    dark: i64,
+    dark: i128,
     /// Number, weight and moment.
-    bins: Vec<(i64, i64, i64)>,
+    bins: Vec<(i64, i128, i128)>,
 }
 
 impl From<Histogram> for SavedHistogram {
@@ -316,14 +316,16 @@ mod tests {
     }
 
     #[test]
-    fn a_full_bin_stays_full() {
+    fn bins_hold_what_no_run_will_add() {
         let mut h = Histogram::default();
-        h.add(0.001, 1e12);
-        h.add(0.001, 1e12);
-        let twice = h.clone();
-        h.merge(&twice);
+        (0..64).for_each(|_| h.add(0.001, 2f64.powi(38)));
+        (0..64).for_each(|_| h.add(f64::NEG_INFINITY, 2f64.powi(38)));
+        for _ in 0..20 {
+            let twice = h.clone();
+            h.merge(&twice);
+        }
         let (mean, weight) = h.lit().next().expect("it is lit");
-        assert_eq!(weight, (1u64 << 39) as f64);
-        assert!((0.0..=1.0 / 64.0).contains(&mean), "{mean}");
+        assert_eq!([weight, h.dark(), h.total() / 2.0], [2f64.powi(64); 3]);
+        assert!((mean - 0.001).abs() < 1e-8, "{mean}");
     }
 }

@@ -22,6 +22,7 @@ mod report;
 mod sampler;
 mod stepping;
 mod steps;
+mod tail;
 mod tally;
 #[cfg(test)]
 mod test_targets;
@@ -43,5 +44,6 @@ pub use report::{LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungR
 pub use sampler::{Development, Learning, Learnt, Sampler, Setup};
 pub use stepping::stepping_stones;
 pub use steps::StepMix;
+pub use tail::Tail;
 pub use tally::{Canvas, Layers, PointGroups, PointLayer, Round, RungCounts, SavedTally, Seen, Sum, Tally};
 pub use weights::Weights;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     Techniques,
-    subpath::{Arrival, CameraEnd, Site},
+    subpath::{Arrival, CameraEnd, LEAST_COSINE, Site},
     weights::weight,
 };
 use crate::{
@@ -103,7 +103,11 @@ pub(super) fn next_event<P: Profile>(
         // by how much likelier light subpaths start there than next-event estimation looks there
         let (place, density) = match kind {
             EmitterKind::Surface if P::FLAT_MESHES => (1.0, rest * cos / d2),
-            EmitterKind::Surface => (place * d2 / (light.pdf * light.normals[0].dot(light.wi).abs()), rest * cos / d2),
+            EmitterKind::Surface => {
+                // at the rim of a sphere the cosine is 0, as is `rest`
+                let cos_light = light.normals[0].dot(light.wi).abs().max(LEAST_COSINE);
+                (place * d2 / (light.pdf * cos_light), rest * cos / d2)
+            }
             EmitterKind::Point => (1.0, rest * cos / d2),
             EmitterKind::SingleDirection => (1.0, rest * cos),
             EmitterKind::Surrounding => (place / light.pdf, rest * cos),

@@ -119,8 +119,8 @@ pub(super) struct Arrival {
     pub survival: f32,
 }
 
-/// Cosines that fluxes are divided by are kept from 0.
-const LEAST_COSINE: f32 = 1e-9;
+/// Cosines that fluxes and densities are divided by are kept from 0.
+pub(super) const LEAST_COSINE: f32 = 1e-9;
 
 impl Particle {
     #[inline(always)]

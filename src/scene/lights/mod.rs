@@ -262,6 +262,27 @@ impl Light {
         self.as_emit().largest()
     }
 
+    /// Where it is, of one without a surface that is somewhere.
+    pub fn position(&self) -> Option<Vec3> {
+        match self {
+            Light::Point(point) => Some(point.position),
+            Light::Spot(spot) => Some(spot.point().position),
+            _ => None,
+        }
+    }
+
+    /// Multiplies all lengths, if it has no surface: intensities grow as squares of distances do, and surfaces get as much
+    /// light as before.
+    pub fn scale(&mut self, factor: f32) {
+        let point = match self {
+            Light::Point(point) => point,
+            Light::Spot(spot) => spot.point_mut(),
+            _ => return,
+        };
+        point.position *= factor;
+        point.intensity *= factor * factor;
+    }
+
     /// Whether it is infinitely far away in all directions, so that what leaves the scene meets it.
     pub fn is_surrounding(&self) -> bool {
         self.kind() == EmitterKind::Surrounding

@@ -55,6 +55,16 @@ impl Spot {
         Spot { point, axis, cos_beam: cos(beam), cos_cutoff: cos(cutoff), cutoff, steepness: 1.0 / (cutoff - beam) }
     }
 
+    /// Where it is, and its intensity on the axis.
+    pub fn point(&self) -> &Point {
+        &self.point
+    }
+
+    /// The same, to be changed.
+    pub fn point_mut(&mut self) -> &mut Point {
+        &mut self.point
+    }
+
     /// 1 − cos of the cutoff, as 2 sin² of its half, which keeps the digits of narrow cones. (Not kept: checksums of
     /// scenes are over all fields, and those of old files must not change.)
     #[inline(always)]

@@ -1,6 +1,8 @@
 //! What the statistics of all rungs say.
 
-use crate::tempering::{DensityOfStates, Estimate, Histogram, Ladder, Normalisers, stepping_stones, uniform_mean};
+use crate::tempering::{
+    DensityOfStates, Estimate, Histogram, Ladder, Normalisers, Tail, stepping_stones, uniform_mean,
+};
 
 /// What is known at the end of a round.
 pub struct Learnt {
@@ -14,6 +16,10 @@ pub struct Learnt {
     pub luminance: Estimate,
     /// How g is spread over the cube.
     pub density: DensityOfStates,
+    /// How bright the brightest of uniform points are, where there are enough to tell.
+    pub tail: Option<Tail>,
+    /// All samples are uniform points.
+    pub is_uniform: bool,
 }
 
 impl Learnt {
@@ -21,7 +27,11 @@ impl Learnt {
     pub(super) fn of(ladder: &Ladder, groups: &[Vec<Histogram>], luminance: Luminance) -> Learnt {
         let groups: Vec<&[Histogram]> = groups.iter().map(Vec::as_slice).collect();
         let normalisers = Normalisers::solve(ladder, &groups);
+        let mut points = Histogram::default();
+        groups.iter().for_each(|group| points.merge(&group[0]));
         Learnt {
+            tail: Tail::of(&points),
+            is_uniform: ladder.rungs() == 1,
             uniform: uniform_mean(&groups),
             stepping_stones: stepping_stones(ladder.betas(), &groups),
             density: DensityOfStates::new(ladder, &groups, &normalisers),
@@ -30,17 +40,32 @@ impl Learnt {
         }
     }
 
-    /// Says when the two estimates of c contradict each other: what the chains do not find, MBAR does not count.
+    /// What keeps the numbers from being trusted, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
+        self.contradiction().into_iter().chain(self.heavy_tail()).collect()
+    }
+
+    /// Says when errors come from uniform points alone and these have no variance; chains follow what is bright, and
+    /// samples of theirs are bounded.
+    fn heavy_tail(&self) -> Option<String> {
+        let Tail { index, .. } = self.tail.filter(|tail| tail.is_heavy && self.is_uniform)?;
+        Some(format!(
+            "few paths carry most of the light: brightness has a tail of index {index:.2}, and from 0.5 on there is no \
+             variance; errors that are told, also that of the mean brightness, are too small; --method re may find more"
+        ))
+    }
+
+    /// Says when the two estimates of c contradict each other: what the chains do not find, MBAR does not count.
+    fn contradiction(&self) -> Option<String> {
         let (uniform, mbar) = (self.uniform, self.normalisers.target);
         if self.normalisers.disagreement.is_nan() || self.normalisers.disagreement <= ALARMING {
-            return Vec::new();
+            return None;
         }
-        vec![format!(
+        Some(format!(
             "the uniform replica alone estimates ln c = {:.4} ± {:.4}, all replicas together {:.4} ± {:.4}: chains may not \
              find all of the light; render longer or compare with --method path",
             uniform.ln_value, uniform.relative_error, mbar.ln_value, mbar.relative_error
-        )]
+        ))
     }
 }
 

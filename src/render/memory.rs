@@ -1,0 +1,145 @@
+//! Memory that a film takes, and whether it can be had: told before any of it is asked for.
+
+use std::fs;
+
+use super::settings::{MappingChoice, Method, Settings};
+use crate::chain::LargeSteps;
+use crate::film::Accumulator;
+use crate::scene::description::FilmDescription;
+use crate::tempering::{Choices, LadderChoice, Layers};
+
+/// What the film of a run takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilmMemory {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Layers that sums are kept in.
+    pub layers: usize,
+    /// Bytes of these sums, all run long.
+    pub sums: u64,
+    /// Bytes of them and of the picture that is made of them in the end.
+    pub most: u64,
+}
+
+/// Sums of a layer as numbers, while a picture is made of them.
+const BYTES_OF_PICTURE_A_LAYER: u64 = 32;
+/// The picture, its density, and both again as they are written.
+const BYTES_OF_PICTURE: u64 = 2 * (12 + 4);
+/// Replicas where their number is free, at most two of which have layers of their own.
+const REPLICAS: usize = 2;
+
+impl FilmMemory {
+    /// Of a run with those settings; of the mapping that takes most where a trial chooses it.
+    pub fn of(film: &FilmDescription, settings: &Settings) -> FilmMemory {
+        let elsewhere = match settings.mapping {
+            MappingChoice::Auto => true,
+            MappingChoice::Fixed(mapping) => mapping.splats_elsewhere(),
+        };
+        let layers = match settings.method {
+            Method::Mlt => {
+                let mlt = settings.mlt;
+                LargeSteps { probability: mlt.large_steps, kelemen_weights: mlt.kelemen_weights }.layers()
+            }
+            Method::Path => Layers::of(&Choices::default(), 1, elsewhere).count,
+            Method::ReplicaExchange => {
+                let rungs = match &settings.ladder {
+                    LadderChoice::Auto => REPLICAS,
+                    LadderChoice::Replicas(k) => *k as usize,
+                    LadderChoice::Betas(betas) => betas.len(),
+                };
+                Layers::of(&settings.ladder_choices(), rungs, elsewhere).count
+            }
+        };
+        let pixels = u64::from(film.width) * u64::from(film.height);
+        let sums = pixels * (Accumulator::BYTES_PER_PIXEL * layers) as u64;
+        let picture = pixels * (BYTES_OF_PICTURE_A_LAYER * layers as u64 + BYTES_OF_PICTURE);
+        FilmMemory { size: [film.width, film.height], layers, sums, most: sums + picture }
+    }
+
+    /// Such as `16384 × 16384 pixels in 4 layers take 68.7 GB, 111.7 GB while the picture is made`.
+    pub fn in_words(&self) -> String {
+        let [width, height] = self.size;
+        let layers = if self.layers == 1 { "layer" } else { "layers" };
+        format!(
+            "{width} × {height} pixels in {} {layers} take {}, {} while the picture is made",
+            self.layers,
+            gigabytes(self.sums),
+            gigabytes(self.most)
+        )
+    }
+
+    /// Why the film cannot be had where only so much memory is to be had; none if it can.
+    pub fn fault(&self, available: u64) -> Option<String> {
+        (self.most > available).then(|| {
+            format!(
+                "the film is too large: {}, and {} are to be had; render it in parts (crop_width, crop_height), or with \
+                 --method mlt, which keeps one layer",
+                self.in_words(),
+                gigabytes(available)
+            )
+        })
+    }
+}
+
+/// Bytes that this process may still ask for: what the system says is available, or what is left of the limit that a
+/// container has. `None` where it is not told.
+pub fn available() -> Option<u64> {
+    let system = fs::read_to_string("/proc/meminfo").ok().and_then(|text| of_meminfo(&text));
+    let number = |file: &str| fs::read_to_string(format!("/sys/fs/cgroup/{file}")).ok()?.trim().parse::<u64>().ok();
+    // of what a group uses, the cache of files can be had back
+    let container = number("memory.max").zip(number("memory.current")).map(|(most, now)| {
+        let stat = fs::read_to_string("/sys/fs/cgroup/memory.stat").unwrap_or_default();
+        let cache = stat.lines().find_map(|line| line.strip_prefix("file ")?.parse::<u64>().ok()).unwrap_or(0);
+        (most + cache).saturating_sub(now)
+    });
+    match (system, container) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// `MemAvailable` of Linux, which counts what caches would give back.
+fn of_meminfo(text: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+/// `1.5 GB`.
+fn gigabytes(bytes: u64) -> String {
+    format!("{:.1} GB", bytes as f64 / 1e9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Filter;
+    use crate::path::MappingKind;
+
+    #[test]
+    fn films_take_what_their_layers_take() {
+        let film = FilmDescription::new(16384, 16384, Filter::Box);
+        let of = |method, mapping| {
+            let settings = Settings { method, mapping: MappingChoice::Fixed(mapping), ..Settings::default() };
+            FilmMemory::of(&film, &settings)
+        };
+        let memory = of(Method::Path, MappingKind::Unidirectional);
+        assert_eq!((memory.layers, memory.sums), (1, 64 << 28), "sixteen bytes for each of four sums");
+        assert_eq!(of(Method::Path, MappingKind::TwoWay).layers, 2);
+        assert_eq!(of(Method::Mlt, MappingKind::TwoWay).layers, 1);
+        assert!(of(Method::ReplicaExchange, MappingKind::TwoWay).layers > 2);
+        let auto = FilmMemory::of(&film, &Settings::default());
+        assert_eq!(auto, of(Method::ReplicaExchange, MappingKind::Bidirectional), "the mapping that takes most");
+        assert!(memory.fault(memory.most).is_none());
+        let fault = memory.fault(memory.most - 1).unwrap();
+        assert!(fault.contains("16384 × 16384 pixels in 1 layer take 17.2 GB"), "{fault}");
+    }
+
+    #[test]
+    fn what_the_system_says_is_read() {
+        let text = "MemTotal:       24000000 kB\nMemFree: 1 kB\nMemAvailable:   22000000 kB\n";
+        assert_eq!(of_meminfo(text), Some(22_000_000 * 1024));
+        assert_eq!(of_meminfo("MemTotal: 5 kB\n"), None);
+        assert_eq!(of_meminfo("MemAvailable: lots kB\n"), None);
+    }
+}

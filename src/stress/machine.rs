@@ -1,0 +1,80 @@
+//! Threads and instruction sets.
+
+use super::{
+    Bench, Case, Check,
+    bench::{Effort, described, means, render, way},
+    check::ROUNDING,
+    scenes::{diffuse, glowing, room, sphere, view},
+};
+use crate::embree::Device;
+use crate::path::MappingKind;
+use crate::render::{Method, Settings};
+use crate::scene::{Scene, SceneDescription};
+
+/// The cases.
+pub(super) fn cases() -> Vec<Case> {
+    vec![
+        Case::new(
+            "machine/threads",
+            "one thread, two, and eight times as many as the machine runs give the same bits: values that differ",
+            threads,
+        )
+        .quick(),
+        Case::new(
+            "machine/instruction-sets",
+            "Embree confined to SSE2 or AVX2 gives the same image but for noise",
+            instruction_sets,
+        ),
+    ]
+}
+
+/// A room with a lamp.
+fn description() -> SceneDescription {
+    described(
+        &(view(1.0, [[0.5, 0.3, -0.2], [0.9, 0.1, -0.5]], 80.0, 5)
+            + &room([0.0; 3], 1.0, &diffuse(0.7))
+            + &sphere([-0.2, 0.3, 0.1], 0.1, false, &(diffuse(0.0) + &glowing(10.0)))),
+    )
+}
+
+fn threads(bench: &Bench) -> Vec<Check> {
+    let scene = bench.scene_of(description());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut checks = Vec::new();
+    for way in bench.ways(&scene) {
+        let image = |threads: usize| {
+            let settings =
+                Settings { threads: Some(threads), mutations_per_pixel: Some(128.0), ..way.settings.clone() };
+            render(&scene, settings).picture.image
+        };
+        let one = image(1);
+        for threads in [2, 8 * cores] {
+            let other = image(threads);
+            let pairs = one.pixels.as_flattened().iter().zip(other.pixels.as_flattened());
+            let differ = pairs.filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+            let name = if threads == 2 { "two" } else { "many" };
+            checks.push(Check::none(format!("{name} threads, {}", way.name), differ));
+        }
+    }
+    checks
+}
+
+fn instruction_sets(bench: &Bench) -> Vec<Check> {
+    let effort = Effort { runs: 16, mutations_per_pixel: 192.0 };
+    let as_it_is = bench.scene_of(description());
+    let ways = [
+        way(Method::Path, MappingKind::Unidirectional),
+        way(Method::Mlt, MappingKind::Bidirectional),
+        way(Method::ReplicaExchange, MappingKind::Bidirectional),
+    ];
+    let mut checks = Vec::new();
+    for isa in ["sse2", "avx2"] {
+        let device = Device::new(&format!("isa={isa}")).unwrap_or_else(|error| panic!("{error}"));
+        let scene = Scene::new(&device, description()).unwrap_or_else(|error| panic!("{error}"));
+        for way in &ways {
+            let [a, b] = [&scene, &as_it_is].map(|scene| means(&bench.runs(scene, way, effort)));
+            checks.push(Check::same(format!("mean with {isa} by {}", way.name), &a, &b, ROUNDING, 0.4));
+        }
+    }
+    checks
+}
