@@ -4,7 +4,7 @@ use super::{Histogram, histogram::BINS_PER_NAT};
 
 /// The tail of the distribution of g over uniform points: P(g > t) falls about as t^(−1/k) for the largest t.
 ///
-/// Where k ≥ ½, E[g²] does not exist: means of g still converge, if k < 1, but slower than 1/√N and with errors that the
+/// Where k ≥ ½, E(g²) does not exist: means of g still converge, if k < 1, but slower than 1/√N and with errors that the
 /// spread of any finite number of points understates.
 ///
 /// k̂ is the mean of ln g above the m-th largest value (Hill 1975), m = min(N/5, 3 √N) as Vehtari et al. (2024) choose it,
