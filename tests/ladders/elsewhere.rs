@@ -364,22 +364,20 @@ fn parts_of_all_rungs_sum_to_the_image() {
 }
 
 fn parts_sum(target: &impl Target<Workspace = Vec<u32>>, filter: Filter) {
-    {
-        let choices = Choices { layers: true, ..replicas(3, Combine::Balance) };
-        let (image, layers) = run(target, &choices, filter, 3);
-        let parts: Vec<Vec<f64>> = layers
-            .iter()
-            .filter(|layer| layer.0.starts_with("rung"))
-            .map(|(name, plane)| match plane {
-                Plane::Rgb(image) => values(image),
-                Plane::Gray(_) => panic!("{name} is grey"),
-            })
-            .collect();
-        assert_eq!(parts.len(), 3);
-        for (i, value) in values(&image).into_iter().enumerate() {
-            let sum: f64 = parts.iter().map(|part| part[i]).sum();
-            assert!((sum / value - 1.0).abs() < 1e-5, "value {i}: {sum} for {value}");
-        }
+    let choices = Choices { layers: true, ..replicas(3, Combine::Balance) };
+    let (image, layers) = run(target, &choices, filter, 3);
+    let parts: Vec<Vec<f64>> = layers
+        .iter()
+        .filter(|layer| layer.0.starts_with("rung"))
+        .map(|(name, plane)| match plane {
+            Plane::Rgb(image) => values(image),
+            Plane::Gray(_) => panic!("{name} is grey"),
+        })
+        .collect();
+    assert_eq!(parts.len(), 3);
+    for (i, value) in values(&image).into_iter().enumerate() {
+        let sum: f64 = parts.iter().map(|part| part[i]).sum();
+        assert!((sum / value - 1.0).abs() < 1e-5, "value {i}: {sum} for {value}");
     }
 }
 
