@@ -171,9 +171,12 @@ fn mappings(features: &Features) -> Vec<String> {
     let names = |kinds: &[MappingKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
     let (whole, part): (Vec<_>, Vec<_>) =
         MappingKind::ALL.into_iter().partition(|kind| kind.misses(features).is_empty());
-    let candidates: Vec<MappingKind> =
-        trial::candidates(features, Method::ReplicaExchange).iter().map(|candidate| candidate.kind).collect();
-    let mut lines = vec![format!("{}; auto tries {}", names(&whole), names(&candidates))];
+    let tried = |method| -> Vec<MappingKind> {
+        trial::candidates(features, method).iter().map(|candidate| candidate.kind).collect()
+    };
+    let (path, chains) = (tried(Method::Path), tried(Method::ReplicaExchange));
+    let for_chains: Vec<MappingKind> = chains.into_iter().filter(|kind| !path.contains(kind)).collect();
+    let mut lines = vec![format!("{}; auto tries {} or, for re, {}", names(&whole), names(&path), names(&for_chains))];
     lines.extend(
         part.iter()
             .map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),
