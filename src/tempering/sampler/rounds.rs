@@ -207,7 +207,9 @@ impl<W: Default + Send> Sampler<W> {
         self.bootstrap = self.points[0];
         self.rays_a_point = self.uniform_rays.map(|[points, rays]| rays as f64 / (points as f64).max(1.0));
         let noise = self.measured(learnt).and_then(|measured| measured.noise_of_points());
-        self.promising = self.choices.ladder != LadderChoice::Auto || noise.is_none_or(|noise| noise > LEAST_NOISE);
+        // no noise at all tells nothing: perhaps no probe has seen light yet
+        let quiet = noise.is_some_and(|noise| noise > 0.0 && noise <= LEAST_NOISE);
+        self.promising = self.choices.ladder != LadderChoice::Auto || !quiet;
         let share = if self.promising { 0.5 } else { MOST_UNIFORM_WITH_CHAINS };
         let share = self.choices.uniform_share.unwrap_or_else(|| self.share_of_evaluations(share));
         self.choice = Choice { ratio: FIRST_RATIO, share, relative_error: f64::NAN };
