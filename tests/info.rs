@@ -80,7 +80,7 @@ fn mappings_that_serve_are_told_from_those_that_do_not() {
         &[],
         &[
             "mappings unidirectional, light, two-way, bidirectional, multiplexed; auto tries unidirectional, light, two-way, \
-             bidirectional or, for re, multiplexed techniques: camera subpaths that hit lights, next-event estimation, light subpaths connected to \
+             bidirectional or multiplexed techniques: camera subpaths that hit lights, next-event estimation, light subpaths connected to \
              the camera, light subpaths joined to camera subpaths dimensions",
         ],
     );
@@ -89,7 +89,7 @@ fn mappings_that_serve_are_told_from_those_that_do_not() {
         &[],
         &[
             "mappings unidirectional, two-way, bidirectional, multiplexed; auto tries unidirectional, two-way, bidirectional \
-             or, for re, multiplexed left out: light, which lacks whatever is seen in perfect mirrors, through smooth glass or through masks",
+             or multiplexed left out: light, which lacks whatever is seen in perfect mirrors, through smooth glass or through masks",
         ],
     );
     assert_says(

@@ -10,7 +10,7 @@ use super::scene::{Opened, SceneArguments};
 use crate::embree::{Device, Scene as Tracer};
 use crate::film::{Accumulator, Filter, PixelFormat};
 use crate::path::{Layout, MappingKind};
-use crate::render::{Method, trial};
+use crate::render::trial;
 use crate::scene::description::FilmDescription;
 use crate::scene::{Appearance, Features, Kernel, Scene, materials};
 use crate::tempering::{Choices, Layers};
@@ -171,12 +171,8 @@ fn mappings(features: &Features) -> Vec<String> {
     let names = |kinds: &[MappingKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
     let (whole, part): (Vec<_>, Vec<_>) =
         MappingKind::ALL.into_iter().partition(|kind| kind.misses(features).is_empty());
-    let tried = |method| -> Vec<MappingKind> {
-        trial::candidates(features, method).iter().map(|candidate| candidate.kind).collect()
-    };
-    let (path, chains) = (tried(Method::Path), tried(Method::ReplicaExchange));
-    let for_chains: Vec<MappingKind> = chains.into_iter().filter(|kind| !path.contains(kind)).collect();
-    let mut lines = vec![format!("{}; auto tries {} or, for re, {}", names(&whole), names(&path), names(&for_chains))];
+    let tried = names(&trial::candidates(features, MappingKind::Bidirectional));
+    let mut lines = vec![format!("{}; auto tries {tried} or multiplexed", names(&whole))];
     lines.extend(
         part.iter()
             .map(|kind| format!("left out: {}, which lacks {}", kind.name(), kind.misses(features).join(" and "))),

@@ -12,6 +12,11 @@ pub fn luminance(rgb: Rgb) -> f32 {
     0.299 * rgb.x + 0.587 * rgb.y + 0.114 * rgb.z
 }
 
+/// The same of sums, which may be beyond f32 where their terms are not.
+pub fn luminance_of_sums([r, g, b]: [f64; 3]) -> f64 {
+    0.299 * r + 0.587 * g + 0.114 * b
+}
+
 /// The contribution of one point of the cube, but for what it gives to the film elsewhere ([`Elsewhere`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contribution {

@@ -14,7 +14,9 @@ mod unidirectional;
 mod vertex;
 mod walk;
 
-pub use contribution::{Contribution, Contributions, Elsewhere, FilmSplat, Lists, Outcome, Whole, luminance};
+pub use contribution::{
+    Contribution, Contributions, Elsewhere, FilmSplat, Lists, Outcome, Whole, luminance, luminance_of_sums,
+};
 pub use faults::{Cause, Causes, Evaluation, Fault, Faults, Origin, Point};
 pub use layout::Layout;
 pub use mapping::{Mapping, MappingKind, Retraced, Workspace};

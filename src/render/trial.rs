@@ -38,9 +38,10 @@ const FAR_BETTER: f64 = 0.3;
 /// How much more error than others the mapping that makes all connections may have in a scene with mirrors or clear glass.
 ///
 /// There a few paths that are hard to find carry much of the error, more than a trial's points can show; the more
-/// techniques are weighed against each other, the less such paths can weigh. On `caustic` and `veach-bidir` trials give
-/// `two-way` 0.5 and 0.8 times the error of `bidirectional`, where ten seconds of `path` (caustic 256 × 256, two threads)
-/// end with 1.6 and 5 times as much.
+/// techniques are weighed against each other, the less such paths can weigh. Trials give `two-way` half and 0.8 times the
+/// error of `bidirectional` on `caustic` and `veach-bidir`. Pictures have 1.6 and five times as much: relMSE 0.149 and 0.091
+/// (relt study scenes/studies/mappings-specular.toml), 0.20 and 0.038 (`relt render --method path` on the scene of Bitterli,
+/// `--mpp 13` and `10` for the same processor time, two seeds).
 const UNSEEN: f64 = 4.0;
 /// Points a second that a budget in time is taken for: half of what one thread makes of the shipped scenes, all mappings
 /// together, for there are slower ones. A number, not a measurement: the choice must not depend on the machine's mood.
@@ -59,32 +60,27 @@ const CLEARLY_LESS: f64 = 0.6;
 /// Luminance, by the mean, below which errors count in absolute terms; as in [`Measure`](crate::chain::Measure).
 const FLOOR: f64 = 0.5;
 
-/// A mapping that could serve a scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Candidate {
-    /// The mapping.
-    pub kind: MappingKind,
-    /// The one whose uniform points tell of it.
-    told_by: MappingKind,
+/// The mapping with all techniques that serves runs of those settings.
+///
+/// Chains want points that are cheap: one technique each, and all at once only where points are uniform. So `re` gets
+/// `multiplexed` where its stratified points are [open](Choices::opens), and are then those of `bidirectional`. `mlt` has no
+/// such points and gets it only where there are mirrors or clear glass (without, it has twelve times the squared error of
+/// `light` on `lattice`; relt study scenes/studies/mappings.toml).
+fn of_all_techniques(scene: &Scene, settings: &Settings, pixels: u64) -> MappingKind {
+    let evaluations = settings.parts.mutations(settings.mutations_per_pixel, pixels);
+    let cheap = match settings.method {
+        Method::Path => false,
+        Method::Mlt => scene.features.delta_lobes,
+        Method::ReplicaExchange => settings.ladder_choices().opens(evaluations, pixels),
+    };
+    if cheap { MappingKind::Multiplexed } else { MappingKind::Bidirectional }
 }
 
-/// The mappings that could serve a scene.
-///
-/// Chains want points that are cheap: one technique each, and all at once only where points are uniform. So for methods
-/// with chains `multiplexed` takes the place of `bidirectional`; for `mlt`, which has no uniform points, only where there are
-/// mirrors or clear glass (without, it has four times the squared error of the other mappings on `lattice`).
-pub fn candidates(features: &Features, method: Method) -> Vec<Candidate> {
-    let chains = match method {
-        Method::Path => false,
-        Method::Mlt => features.delta_lobes,
-        Method::ReplicaExchange => true,
-    };
-    let all = if chains { MappingKind::Multiplexed } else { MappingKind::Bidirectional };
-    let told_by = |kind| if kind == all { MappingKind::Bidirectional } else { kind };
+/// The mappings that could serve a scene, `all` being the one with all techniques.
+pub fn candidates(features: &Features, all: MappingKind) -> Vec<MappingKind> {
     [MappingKind::Unidirectional, MappingKind::Light, MappingKind::TwoWay, all]
         .into_iter()
         .filter(|kind| kind.misses(features).is_empty())
-        .map(|kind| Candidate { kind, told_by: told_by(kind) })
         .collect()
 }
 
@@ -103,8 +99,8 @@ pub fn settle(scene: &Scene, settings: &Settings) -> (MappingKind, Option<String
 /// that. A function of scene, seed and budget alone: costs are counted in rays, not in seconds.
 pub fn try_mappings(scene: &Scene, settings: &Settings) -> Trial {
     let rare_paths = scene.features.delta_lobes;
-    let candidates = candidates(&scene.features, settings.method);
     let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    let candidates = candidates(&scene.features, of_all_techniques(scene, settings, pixels));
     let points = points_of_each(settings, pixels, candidates.len());
     if points < FEWEST_POINTS {
         return Trial { chosen: MappingKind::Unidirectional, errors: Vec::new(), rare_paths };
@@ -114,19 +110,22 @@ pub fn try_mappings(scene: &Scene, settings: &Settings) -> Trial {
     let best = errors[1..].iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
     let clear = !rare_paths && !(FAR_BETTER..NO_BETTER).contains(&best);
     let errors = if clear || points == FEWEST_POINTS { errors } else { self::errors(scene, &candidates, rng, points) };
-    let counts = |(kind, error): (MappingKind, f64)| match kind {
+    let counts = |(kind, error): &(MappingKind, f64)| match kind {
         MappingKind::Bidirectional | MappingKind::Multiplexed if rare_paths => error / UNSEEN,
-        _ => error,
+        _ => *error,
     };
-    let best = errors.iter().min_by(|a, b| counts(**a).total_cmp(&counts(**b))).expect("some mapping was tried");
-    let chosen = if counts(*best) < CLEARLY_LESS { best.0 } else { MappingKind::Unidirectional };
+    let best = errors.iter().min_by(|a, b| counts(a).total_cmp(&counts(b))).expect("some mapping was tried");
+    let chosen = if counts(best) < CLEARLY_LESS { best.0 } else { MappingKind::Unidirectional };
     Trial { chosen, errors, rare_paths }
 }
 
 /// Squared errors at equal cost, by that of the unidirectional mapping, which is the first, after so many points of each.
-fn errors(scene: &Scene, candidates: &[Candidate], rng: Rng, points: u64) -> Vec<(MappingKind, f64)> {
-    let found: Vec<Found> =
-        candidates.iter().map(|candidate| Found::new(scene, candidate.told_by, rng, points)).collect();
+fn errors(scene: &Scene, candidates: &[MappingKind], rng: Rng, points: u64) -> Vec<(MappingKind, f64)> {
+    let told_by = |kind: MappingKind| match kind {
+        MappingKind::Multiplexed => MappingKind::Bidirectional,
+        kind => kind,
+    };
+    let found: Vec<Found> = candidates.iter().map(|kind| Found::new(scene, told_by(*kind), rng, points)).collect();
     let sharpest = found
         .iter()
         .min_by(|a, b| a.spread().total_cmp(&b.spread()))
@@ -134,7 +133,7 @@ fn errors(scene: &Scene, candidates: &[Candidate], rng: Rng, points: u64) -> Vec
     let errors: Vec<f64> = found.iter().map(|found| found.error(sharpest) * found.cost).collect();
     let unidirectional = errors[0];
     let relative = |error: f64| if unidirectional > 0.0 { error / unidirectional } else { 1.0 };
-    candidates.iter().zip(errors).map(|(candidate, error)| (candidate.kind, relative(error))).collect()
+    candidates.iter().copied().zip(errors.into_iter().map(relative)).collect()
 }
 
 /// Points for each of so many mappings, in whole batches.
@@ -160,11 +159,8 @@ impl Trial {
             .map(|(kind, error)| format!("{} {error:.2}", kind.name()))
             .collect();
         let others = others.join(", ");
-        let least = self
-            .errors
-            .iter()
-            .all(|(_, error)| self.errors.iter().any(|(kind, own)| *kind == self.chosen && own <= error));
-        let rare = if self.rare_paths && !least {
+        let own = self.errors.iter().find(|(kind, _)| *kind == self.chosen).map_or(0.0, |(_, error)| *error);
+        let rare = if self.rare_paths && self.errors.iter().any(|(_, error)| *error < own) {
             ", not counting what mirrors and glass do too rarely for a trial, where most connections help most"
         } else {
             ""

@@ -75,6 +75,13 @@ impl Combine {
     }
 }
 
+/// Evaluations a pixel from which on stratified points leave open what they choose.
+///
+/// Chains first have to see two passes of open points. At 25 evaluations a pixel that leaves `caustic` with a relMSE of 0.18 in
+/// the place of 0.07, which points that choose reach at 60 a pixel for the same cost (`relt render
+/// scenes/caustic/scene.xml --mapping multiplexed --mpp 25 --seed 1`, to 3, with this constant 0; `--mpp 60`).
+const OPEN_FROM: u64 = 256;
+
 /// Everything that may be chosen about replica exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
@@ -88,4 +95,23 @@ pub struct Choices {
     pub measure: Measure,
     /// Keep E_u, E_e and every rung's part of the image.
     pub layers: bool,
+}
+
+impl Choices {
+    /// Whether there are no replicas but the uniform one.
+    pub fn is_uniform_alone(&self) -> bool {
+        match &self.ladder {
+            LadderChoice::Auto => false,
+            LadderChoice::Replicas(replicas) => *replicas == 1,
+            LadderChoice::Betas(betas) => betas.len() == 1,
+        }
+    }
+
+    /// Whether stratified points of a run of so many evaluations (without end where absent) leave open what they choose, on a
+    /// target where points choose among [outcomes](crate::chain::Target::has_outcomes): where the balance heuristic joins
+    /// them to chains, and the run is long.
+    pub fn opens(&self, evaluations: Option<u64>, pixels: u64) -> bool {
+        let balances = self.combine == Combine::Balance && !self.is_uniform_alone();
+        balances && evaluations.is_none_or(|n| n >= OPEN_FROM * pixels)
+    }
 }

@@ -83,7 +83,7 @@ impl Histogram {
     /// lit in part, and what is left of 1 is dark, be it less than nothing.
     #[inline(always)]
     pub fn add_dark(&mut self, weight: f64) {
-        self.dark += i128::from((weight * WEIGHT_STEPS).round() as i64);
+        self.dark += i128::from((weight * WEIGHT_STEPS + 0.5f64.copysign(weight)) as i64);
     }
 
     /// The page of that number, made if need be.

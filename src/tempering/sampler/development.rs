@@ -21,14 +21,14 @@ pub struct Development {
 impl<W: Default + Send> Sampler<W> {
     /// The picture so far, states included that have not been recorded yet; changes nothing.
     pub fn develop(&self) -> Development {
-        let mut pending = Tally::new(self.round.ladder.rungs(), self.screen.layers.count);
+        let mut pending = Tally::new(self.state.round.ladder.rungs(), self.screen.layers.count);
         let (mut groups, mut sums) = (Vec::new(), Vec::new());
         let canvas = self.screen.canvas();
         for (number, portion) in self.portions.iter().enumerate() {
             let mut group = self.group(number);
             if let Some(block) = &portion.ladders {
                 pending.histograms.fill(Histogram::default());
-                block.pending(&canvas, &self.round, &mut pending);
+                block.pending(&canvas, &self.state.round, &mut pending);
                 group.iter_mut().zip(&pending.histograms).for_each(|(sum, h)| sum.merge(h));
             }
             groups.push(group);
@@ -75,12 +75,16 @@ impl<W: Default + Send> Planes<'_, W> {
 
     /// Ẑ_K by the magnitude that states are kept in.
     fn unit(&self) -> f64 {
-        libm::exp(self.learnt.normalisers.target.ln_value - self.sampler.ln_unit)
+        libm::exp(self.learnt.normalisers.target.ln_value - self.sampler.state.ln_unit)
     }
 
     /// What a sum of tempered states on the balanced film is multiplied by.
     fn tempered_scale(&self) -> f64 {
-        if self.sampler.states_a_rung == 0 { 0.0 } else { self.pixels() * self.unit() / self.sampler.effort }
+        if self.sampler.state.states_a_rung == 0 {
+            0.0
+        } else {
+            self.pixels() * self.unit() / self.sampler.state.effort
+        }
     }
 
     /// All rungs together: the mean over each pixel's uniform points, plus the tempered states.
@@ -97,7 +101,7 @@ impl<W: Default + Send> Planes<'_, W> {
     /// The mean over each pixel's stratified points.
     fn even(&self) -> Image {
         let layer = self.sampler.screen.layers.even.expect("a layer of stratified points");
-        let [stratified, _] = self.sampler.points;
+        let [stratified, _] = self.sampler.state.points;
         // runs go through the pixels in the same order
         let longest = if self.sampler.longest > 0 { self.sampler.longest } else { stratified };
         let points = self.points(layer, [longest, 0], stratified as f64);
@@ -107,7 +111,7 @@ impl<W: Default + Send> Planes<'_, W> {
     /// E_u.
     fn uniform(&self) -> Image {
         let layer = self.sampler.screen.layers.uniform.expect("a layer of uniform points");
-        let [stratified, offered] = self.sampler.points;
+        let [stratified, offered] = self.sampler.state.points;
         let points = self.points(layer, [stratified, offered], (stratified + offered) as f64);
         self.image(|i| points.of(i))
     }
@@ -115,9 +119,9 @@ impl<W: Default + Send> Planes<'_, W> {
     /// What uniform points add to the balanced image: those since chains started.
     fn hot(&self) -> PointImage {
         let layer = self.sampler.screen.layers.hot.expect("a layer of the balanced image");
-        let [stratified, offered] = self.sampler.points;
+        let [stratified, offered] = self.sampler.state.points;
         // a round's points share its evaluations among them as their effort, so all of them sum to all of these
-        self.points(layer, [stratified - self.sampler.bootstrap, offered], self.sampler.effort)
+        self.points(layer, [stratified - self.sampler.state.bootstrap, offered], self.sampler.state.effort)
     }
 
     /// Of a layer with so many stratified points in the order of pixels and so many offered ones, of weight `weight` all
@@ -131,7 +135,7 @@ impl<W: Default + Send> Planes<'_, W> {
 
     /// E_e.
     fn target(&self) -> Image {
-        let states = (self.sampler.states_a_rung as f64).max(1.0);
+        let states = (self.sampler.state.states_a_rung as f64).max(1.0);
         let scale = self.pixels() * self.unit() / states;
         match self.sums(self.sampler.screen.layers.target) {
             Some(sums) => self.image(|i| [0, 1, 2].map(|ch| sums[i][ch] * scale)),
@@ -153,14 +157,14 @@ impl<W: Default + Send> Planes<'_, W> {
             return layers;
         }
         layers.push(("uniform".into(), Plane::Rgb(self.uniform())));
-        if self.sampler.round.ladder.chains() == 0 {
+        if self.sampler.state.round.ladder.chains() == 0 {
             return layers;
         }
         layers.push(("target".into(), Plane::Rgb(self.target())));
         let hot = self.hot();
         layers.push(("rung1".into(), Plane::Rgb(self.image(|i| hot.of(i)))));
         let scale = self.tempered_scale();
-        for k in 1..self.sampler.round.ladder.rungs() {
+        for k in 1..self.sampler.state.round.ladder.rungs() {
             let sums = self.sums(on.rungs.map(|first| first + k - 1)).unwrap_or_default();
             layers
                 .push((format!("rung{}", k + 1), Plane::Rgb(self.image(|i| [0, 1, 2].map(|ch| sums[i][ch] * scale)))));

@@ -41,9 +41,6 @@ use crate::{
 /// Uniform points before chains start, and before that where it is to be learnt where chains are wanted; a 32nd of the
 /// run where that is less.
 const BOOTSTRAP: u64 = 1 << 17;
-/// Evaluations a pixel from which on stratified points are open: the two passes that the first round takes of them are too
-/// much of shorter runs (`caustic` at 25 a pixel: relMSE 0.18 in the place of 0.07 at equal cost).
-const OPEN_FROM: u64 = 256;
 /// The same of open points, which are those of many choices, where it is to be learnt where chains are wanted.
 const OPEN_BOOTSTRAP: u64 = 1 << 14;
 /// Ladders longer than 64 rungs get fewer blocks, with no more rungs together than this: each block has histograms for
@@ -59,10 +56,23 @@ pub struct Sampler<W> {
     screen: Screen,
     plan: Plan,
     portions: Vec<Portion<W>>,
-    round: Round,
-    schedule: Schedule,
     /// Where chains are wanted; absent where they follow the luminance itself, and before that is known.
     importance: Option<Arc<Importance>>,
+    state: State,
+    /// Stratified points of the longest run that is pooled; 0 where the sampler did all itself.
+    longest: u64,
+    /// Evaluations that the run was planned for: how it is cut up and how long it learns follow from that.
+    planned: Option<u64>,
+    /// Evaluations to go through.
+    wanted: Option<u64>,
+    reports: Vec<RoundReport>,
+}
+
+/// All that changes between sweeps, but for portions, film and importance: what there is to save of it.
+#[derive(Clone, Serialize, Deserialize)]
+struct State {
+    round: Round,
+    schedule: Schedule,
     /// Magnitude of c, fixed when chains start.
     ln_unit: f64,
     /// Points offered to a ladder each sweep.
@@ -84,27 +94,52 @@ pub struct Sampler<W> {
     image_correlation: Option<f64>,
     /// States of chains on each rung so far, of all ladders.
     states_a_rung: u64,
-    /// Uniform points before chains started.
+    /// Uniform points for the image before chains started.
     bootstrap: u64,
-    /// Uniform points so far: those that came in the order of pixels, and those offered to ladders.
+    /// Uniform points for the image so far: those that came in the order of pixels, and those offered to ladders.
     points: [u64; 2],
-    /// Whether stratified points leave open what they choose.
-    open: bool,
-    /// Stratified points so far and their rays: of those that chose, and of open ones.
-    uniform_rays: [[u64; 2]; 2],
-    /// Rays of a point that chose and of an open one, as the first sweeps had them.
-    rays_a_point: [f64; 2],
+    /// Stratified points before chains started, and their rays: of those that chose, and of open ones.
+    first_rays: [[u64; 2]; 2],
     sweeps: u64,
     evaluations: u64,
-    /// Stratified points of the longest run that is pooled; 0 where the sampler did all itself.
-    longest: u64,
-    /// Evaluations that the run was planned for: how it is cut up and how long it learns follow from that.
-    planned: Option<u64>,
-    /// Evaluations to go through.
-    wanted: Option<u64>,
     faults: Faults,
     rays: u64,
-    reports: Vec<RoundReport>,
+}
+
+impl State {
+    /// Before the first sweep.
+    fn new(schedule: Schedule, open: bool) -> State {
+        State {
+            round: Round {
+                ladder: Ladder::uniform(),
+                weights: Weights::uniform_alone(),
+                mixes: [(); TRIALS].map(|()| Vec::new()),
+                effort: [1.0, 0.0],
+                only_offers: false,
+                open,
+                half: u64::MAX,
+            },
+            schedule,
+            ln_unit: 0.0,
+            offers: 0,
+            ladders_a_block: 0,
+            choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            promising: true,
+            centre: steps::KELEMEN,
+            moved: false,
+            ladder_rays: 0,
+            effort: 0.0,
+            image_correlation: None,
+            states_a_rung: 0,
+            bootstrap: 0,
+            points: [0; 2],
+            first_rays: [[0; 2]; 2],
+            sweeps: 0,
+            evaluations: 0,
+            faults: Faults::default(),
+            rays: 0,
+        }
+    }
 }
 
 /// The film and all that belongs to it.
@@ -196,7 +231,7 @@ impl<W: Default + Send> Sampler<W> {
         plan.blocks = plan.blocks.min((RUNGS_OF_ALL_BLOCKS / most_rungs).max(FEWEST_BLOCKS) & !1); // halves are compared
         let layers = Layers::of(&choices, most_rungs, elsewhere);
         let map = ProbeMap::new(size);
-        let learns = choices.combine == Combine::Balance && most_rungs > 1;
+        let learns = choices.combine == Combine::Balance && !choices.is_uniform_alone();
         let screen = Screen {
             footprint,
             size,
@@ -219,52 +254,24 @@ impl<W: Default + Send> Sampler<W> {
             starts: Vec::new(),
         };
         let a_sweep = (plan.blocks * plan.lanes()) as u64;
-        let only_uniform = most_rungs == 1;
+        let only_uniform = choices.is_uniform_alone();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let open = outcomes && learns && evaluations.is_none_or(|n| n >= OPEN_FROM * pixels);
+        let open = outcomes && choices.opens(evaluations, pixels);
         let first = if open && choices.measure == Measure::Relative { OPEN_BOOTSTRAP } else { BOOTSTRAP };
         let length = if only_uniform { u64::MAX } else { at_most(first, evaluations, 1.0 / 32.0).div_ceil(a_sweep) };
+        let schedule = Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() };
         Sampler {
             rng,
             screen,
             portions: (0..plan.blocks).map(portion).collect(),
-            round: Round {
-                ladder: Ladder::uniform(),
-                weights: Weights::uniform_alone(),
-                mixes: [(); TRIALS].map(|()| Vec::new()),
-                effort: [1.0, 0.0],
-                only_offers: false,
-                open,
-                half: u64::MAX,
-            },
-            schedule: Schedule { length, points: plan.lanes(), frozen: only_uniform, ..Schedule::default() },
             plan,
             choices,
             importance: None,
-            ln_unit: 0.0,
-            offers: 0,
-            ladders_a_block: 0,
-            choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
-            promising: true,
-            centre: steps::KELEMEN,
-            moved: false,
-            ladder_rays: 0,
-            image_correlation: None,
-            bootstrap: 0,
-            points: [0; 2],
-            open,
-            uniform_rays: [[0; 2]; 2],
-            rays_a_point: [0.0; 2],
-            sweeps: 0,
-            reports: Vec::new(),
-            effort: 0.0,
-            states_a_rung: 0,
-            evaluations: 0,
+            state: State::new(schedule, open),
             longest: 0,
             planned: evaluations,
             wanted: evaluations,
-            rays: 0,
-            faults: Faults::default(),
+            reports: Vec::new(),
         }
     }
 
@@ -275,23 +282,23 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Evaluations so far.
     pub fn evaluations(&self) -> u64 {
-        self.evaluations
+        self.state.evaluations
     }
 
     /// Sweeps that are left of the budget, as long as sweeps are now; none without a budget.
     pub fn sweeps_left(&self) -> Option<u64> {
-        self.wanted.map(|wanted| wanted.saturating_sub(self.evaluations).div_ceil(self.a_sweep()))
+        self.wanted.map(|wanted| wanted.saturating_sub(self.state.evaluations).div_ceil(self.a_sweep()))
     }
 
     /// Evaluations of a sweep.
     fn a_sweep(&self) -> u64 {
         let ladders: usize = self.portions.iter().flat_map(|portion| &portion.ladders).map(Block::lanes).sum();
-        ladders as u64 * self.schedule.ladder_sweeps + (self.portions.len() * self.schedule.points) as u64
+        ladders as u64 * self.state.schedule.ladder_sweeps + (self.portions.len() * self.state.schedule.points) as u64
     }
 
     /// What is still being learnt.
     pub fn learning(&self) -> Learning {
-        match self.schedule {
+        match self.state.schedule {
             Schedule { frozen: true, .. } => Learning::Over,
             Schedule { round: 0, .. } => Learning::Bootstrap,
             _ => Learning::Rounds,
@@ -310,19 +317,22 @@ impl<W: Default + Send> Sampler<W> {
         let learning = self.learning();
         let until = until.unwrap_or(u64::MAX);
         let mut gone = 0;
-        while gone < sweeps && self.evaluations < until && self.sweeps_left() != Some(0) {
-            if self.schedule.done == self.schedule.length {
+        while gone < sweeps && self.state.evaluations < until && self.sweeps_left() != Some(0) {
+            if self.state.schedule.done == self.state.schedule.length {
                 self.end_round(target);
                 if self.learning() != learning {
                     break;
                 }
             }
-            let stop =
-                if self.schedule.done < self.schedule.middle() { self.schedule.middle() } else { self.schedule.length };
+            let stop = if self.state.schedule.done < self.state.schedule.middle() {
+                self.state.schedule.middle()
+            } else {
+                self.state.schedule.length
+            };
             let now = (sweeps - gone)
-                .min(stop - self.schedule.done)
+                .min(stop - self.state.schedule.done)
                 .min(self.sweeps_left().unwrap_or(u64::MAX))
-                .min((until - self.evaluations).div_ceil(self.a_sweep()));
+                .min((until - self.state.evaluations).div_ceil(self.a_sweep()));
             self.work(target, now);
             gone += now;
         }
@@ -331,9 +341,9 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Sweeps within a round.
     fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
-        let (round, schedule, screen) = (&self.round, self.schedule, &self.screen);
+        let (round, schedule, screen) = (&self.state.round, self.state.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
-        let purpose = match self.open {
+        let purpose = match round.open {
             true if keeps && !(self.weighs() && self.importance.is_none()) => Use::Starts,
             true => Use::OpenImage,
             false => Use::Image,
@@ -359,51 +369,54 @@ impl<W: Default + Send> Sampler<W> {
                 block.deposit(&canvas);
             }
         });
-        let drawn = sweeps * (self.portions.len() * self.schedule.points) as u64;
-        let uniform_rays = &mut self.uniform_rays[usize::from(purpose == Use::OpenImage)];
-        uniform_rays[0] += drawn;
+        let drawn = sweeps * (self.portions.len() * self.state.schedule.points) as u64;
+        let mut uniform_rays = 0;
         for portion in &mut self.portions {
             let (uniform, faults) = portion.uniform.take_rays_and_faults();
-            uniform_rays[1] += uniform;
+            uniform_rays += uniform;
             let (ladders, more) = portion.ladders.as_mut().map(Block::take_rays_and_faults).unwrap_or_default();
-            self.rays += uniform + ladders;
-            [faults, more].iter().for_each(|faults| self.faults.merge(faults));
-            self.ladder_rays += ladders;
+            self.state.rays += uniform + ladders;
+            [faults, more].iter().for_each(|faults| self.state.faults.merge(faults));
+            self.state.ladder_rays += ladders;
+        }
+        if keeps {
+            let first = &mut self.state.first_rays[usize::from(purpose == Use::OpenImage)];
+            *first = [first[0] + drawn, first[1] + uniform_rays];
         }
         if purpose != Use::Starts {
-            self.points[0] += drawn;
+            self.state.points[0] += drawn;
         }
-        if !self.open {
-            self.points[1] += sweeps * schedule.ladder_sweeps * self.ladders() * self.offers as u64;
+        if !self.state.round.open {
+            self.state.points[1] += sweeps * schedule.ladder_sweeps * self.ladders() * self.state.offers as u64;
         }
-        self.sweeps += sweeps;
+        self.state.sweeps += sweeps;
         let evaluations = sweeps * self.a_sweep();
-        self.evaluations += evaluations;
+        self.state.evaluations += evaluations;
         if self.screen.layers.hot.is_some() {
-            self.effort += evaluations as f64;
+            self.state.effort += evaluations as f64;
         }
-        self.schedule.done += sweeps;
-        self.states_a_rung += sweeps * schedule.ladder_sweeps * self.ladders();
+        self.state.schedule.done += sweeps;
+        self.state.states_a_rung += sweeps * schedule.ladder_sweeps * self.ladders();
     }
 
     /// Ladders at work.
     fn ladders(&self) -> u64 {
-        self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.ladders_a_block as u64
+        self.portions.iter().filter(|p| p.ladders.is_some()).count() as u64 * self.state.ladders_a_block as u64
     }
 
     /// Evaluations in all, where they are limited: whole sweeps, so a little more than was asked for.
     pub fn evaluations_wanted(&self) -> Option<u64> {
-        self.sweeps_left().map(|sweeps| self.evaluations + sweeps * self.a_sweep())
+        self.sweeps_left().map(|sweeps| self.state.evaluations + sweeps * self.a_sweep())
     }
 
     /// Rays traced so far.
     pub fn rays(&self) -> u64 {
-        self.rays
+        self.state.rays
     }
 
     /// Contributions so far that could not be used and were taken as zero.
     pub fn faults(&self) -> &Faults {
-        &self.faults
+        &self.state.faults
     }
 
     /// The film.
@@ -413,7 +426,7 @@ impl<W: Default + Send> Sampler<W> {
 
     /// The ladder at work; of one rung as long as there is none.
     pub fn ladder(&self) -> &Ladder {
-        &self.round.ladder
+        &self.state.round.ladder
     }
 
     /// Mean acceptance of mutations by tempered rung and of swaps by pair, in this round; empty where not all of them are

@@ -1,11 +1,11 @@
 //! Uniform points of several runs as those of one.
 
-use super::{Sampler, Setup, most_rungs};
+use super::{Sampler, Setup};
 
 impl<W: Default + Send> Sampler<W> {
     /// Whether there are uniform points only, and will be: then sums of several runs of the same job may be added.
     pub fn is_uniform_alone(&self) -> bool {
-        most_rungs(&self.choices) == 1
+        self.choices.is_uniform_alone()
     }
 
     /// A sampler of the same job that has done nothing.
@@ -17,7 +17,7 @@ impl<W: Default + Send> Sampler<W> {
             size: self.screen.size,
             unit: self.screen.unit,
             elsewhere: self.screen.elsewhere,
-            outcomes: self.open,
+            outcomes: self.state.round.open,
             evaluations: self.planned,
         })
     }
@@ -31,11 +31,11 @@ impl<W: Default + Send> Sampler<W> {
         assert!(self.is_uniform_alone() && other.is_uniform_alone(), "chains cannot be pooled");
         self.screen.film.merge(&other.screen.film);
         self.screen.groups.merge(&other.screen.groups);
-        self.longest = self.longest.max(other.points[0]);
-        self.points[0] += other.points[0];
-        self.sweeps += other.sweeps;
-        self.evaluations += other.evaluations;
-        self.rays += other.rays;
-        self.faults.merge(&other.faults);
+        self.longest = self.longest.max(other.state.points[0]);
+        self.state.points[0] += other.state.points[0];
+        self.state.sweeps += other.state.sweeps;
+        self.state.evaluations += other.state.evaluations;
+        self.state.rays += other.state.rays;
+        self.state.faults.merge(&other.state.faults);
     }
 }

@@ -12,7 +12,7 @@ const BARRIER_POINTS: usize = 33;
 impl<W: Default + Send> Sampler<W> {
     /// The report of the round at work, as far as it has come.
     pub(super) fn report(&self, learnt: &Learnt) -> RoundReport {
-        let ladder = &self.round.ladder;
+        let ladder = &self.state.round.ladder;
         let betas = ladder.betas();
         let counts = self.counts_by_rung();
         let density = &learnt.density;
@@ -26,9 +26,9 @@ impl<W: Default + Send> Sampler<W> {
         let index = blocks().find_map(|block| block.index());
         let grid = (0..BARRIER_POINTS).map(|i| i as f64 / (BARRIER_POINTS - 1) as f64);
         RoundReport {
-            round: self.schedule.round,
-            sweeps: self.sweeps,
-            mutations: self.evaluations,
+            round: self.state.schedule.round,
+            sweeps: self.state.sweeps,
+            mutations: self.state.evaluations,
             ladders: ladders as usize,
             replicas: ladder.rungs(),
             betas: betas.to_vec(),
@@ -43,7 +43,7 @@ impl<W: Default + Send> Sampler<W> {
             round_trips_predicted: if chains {
                 // with one pair, which swaps in every sweep and not in every second, twice as many
                 let one_pair = if rejection.len() == 1 { 2.0 } else { 1.0 };
-                one_pair * self.ladder_steps(self.schedule.done) as f64 / (2.0 + 2.0 * waits)
+                one_pair * self.ladder_steps(self.state.schedule.done) as f64 / (2.0 + 2.0 * waits)
             } else {
                 f64::NAN
             },
@@ -53,14 +53,14 @@ impl<W: Default + Send> Sampler<W> {
                 stepping_stones: told(&learnt.stepping_stones),
                 mbar: told(&learnt.normalisers.target),
             },
-            used: if self.states_a_rung > 0 { Normaliser::Mbar } else { Normaliser::Uniform },
+            used: if self.state.states_a_rung > 0 { Normaliser::Mbar } else { Normaliser::Uniform },
             uniform_share: self.uniform_share(),
-            offers: if chains { self.offers as u64 } else { 0 },
-            chain_ratio: self.round.weights.ratio(),
+            offers: if chains { self.state.offers as u64 } else { 0 },
+            chain_ratio: self.state.round.weights.ratio(),
             split_r_hat,
             r_hat_halves,
-            non_finite: self.faults.total(),
-            rays: self.rays,
+            non_finite: self.state.faults.total(),
+            rays: self.state.rays,
             rungs: if chains { self.rung_reports(learnt, &counts) } else { Vec::new() },
             index_process: index.map_or_else(Vec::new, |index| index.rungs.clone()),
             index_stride: index.map_or(0, |index| index.stride),
@@ -78,7 +78,7 @@ impl<W: Default + Send> Sampler<W> {
     /// Rejection of each pair for independent states; the first counts dark offers as well.
     fn predicted_rejection(&self, learnt: &Learnt) -> Vec<f64> {
         let density = &learnt.density;
-        let pairs = self.round.ladder.betas().windows(2);
+        let pairs = self.state.round.ladder.betas().windows(2);
         let of_lit = |pair: &[f64]| density.rejection(pair[0], pair[1]);
         pairs
             .enumerate()
@@ -90,18 +90,18 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     fn rung_reports(&self, learnt: &Learnt, counts: &[RungCounts]) -> Vec<RungReport> {
-        let mut seen = vec![crate::tempering::Histogram::default(); self.round.ladder.rungs()];
+        let mut seen = vec![crate::tempering::Histogram::default(); self.state.round.ladder.rungs()];
         for number in 0..self.portions.len() {
             seen.iter_mut().zip(&self.group(number)).for_each(|(sum, h)| sum.merge(h));
         }
         // tempered luminance is in units of the weights, whose normalisers are only now known
-        let scale = libm::exp(learnt.normalisers.target.ln_value - self.ln_unit);
+        let scale = libm::exp(learnt.normalisers.target.ln_value - self.state.ln_unit);
         let luminance = |k: usize| counts[k].luminance * if k == 0 { 1.0 } else { scale };
         let all: f64 = (0..counts.len()).map(luminance).sum();
         (0..counts.len())
             .map(|k| {
                 let proposed: u64 = counts[k].steps.iter().map(|c| c.proposed).sum();
-                let points = self.schedule.done * (self.portions.len() * self.points_a_block()) as u64;
+                let points = self.state.schedule.done * (self.portions.len() * self.points_a_block()) as u64;
                 let dwell = self.dwell(k);
                 let lineage = (dwell.sum > 0).then(|| dwell.squares as f64 / dwell.sum as f64);
                 let accepted: f64 =
@@ -109,19 +109,19 @@ impl<W: Default + Send> Sampler<W> {
                 let (mean_ln_g, sd_ln_g) = seen[k].mean_and_sd().unwrap_or((f64::NAN, f64::NAN));
                 let evaluations = if k == 0 { points } else { proposed };
                 RungReport {
-                    beta: self.round.ladder.betas()[k],
+                    beta: self.state.round.ladder.betas()[k],
                     evaluations,
                     acceptance: if k == 0 { f64::NAN } else { accepted / proposed as f64 },
                     scales: if k == 0 { Vec::new() } else { self.scale_reports(k, &counts[k]) },
                     mean_ln_g,
                     sd_ln_g,
                     dark_share: seen[k].dark() / seen[k].total(),
-                    tau_image: (k > 0).then_some(self.image_correlation).flatten(),
+                    tau_image: (k > 0).then_some(self.state.image_correlation).flatten(),
                     tau_lineage: lineage,
                     effective: if k == 0 {
                         evaluations as f64
                     } else {
-                        self.image_correlation.map_or(f64::NAN, |tau| evaluations as f64 / tau.max(1.0))
+                        self.state.image_correlation.map_or(f64::NAN, |tau| evaluations as f64 / tau.max(1.0))
                     },
                     image_share: luminance(k) / all,
                 }
@@ -130,7 +130,7 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     fn scale_reports(&self, k: usize, counts: &RungCounts) -> Vec<ScaleReport> {
-        let weights = self.round.mixes[TRIALS / 2][k].weights();
+        let weights = self.state.round.mixes[TRIALS / 2][k].weights();
         let report = |i: usize| ScaleReport {
             size: steps::size(i),
             weight: weights[i],
@@ -154,10 +154,10 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Split R̂ of ln g on the target, with blocks of ladders in the place of chains, and the number of their halves.
     fn split_r_hat(&self) -> (f64, usize) {
-        let top = self.round.ladder.chains();
+        let top = self.state.round.ladder.chains();
         let mut means = Vec::new();
         let mut within = crate::tempering::Histogram::default();
-        let rungs = self.round.ladder.rungs();
+        let rungs = self.state.round.ladder.rungs();
         for block in self.portions.iter().filter_map(|portion| portion.ladders.as_ref()) {
             let mut counts = vec![RungCounts::default(); rungs];
             block.add_counts(&mut counts);

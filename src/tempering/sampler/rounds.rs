@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{Learnt, Luminance, MOST_AUTOMATIC, Sampler, at_most};
 use crate::{
     chain::{Importance, Start, Target, resample},
+    path::luminance_of_sums,
     tempering::{
         Block, Estimate, Histogram, Ladder, LadderChoice, Probes, RungCounts, StepMix, Sum, Weights,
         placement::rungs,
@@ -54,11 +55,13 @@ const LEAST_UNIFORM: f64 = 0.1;
 const MOST_UNIFORM_WITH_CHAINS: f64 = 15.0 / 16.0;
 /// States of chains have at least the noise of a number of samples that chance decides: a relative variance of 1 a state in
 /// the pixel. Where that of a uniform point is not more than this, chains are to be given up, unless they find what those
-/// points do not know of: they get a small part of the work from the start. (By camera paths `cornell-box` has some 0.14,
-/// `lattice` 50: relMSE times mutations per pixel of `--method path`.)
+/// points do not know of: they get a small part of the work from the start. (The bootstrap of 100 mutations per pixel finds
+/// 0.55 on `cornell-box` and 350 on `lattice` by camera paths, 7.4 on the latter by `--mapping light`. `relt render
+/// scenes/cornell-box/scene.xml --mpp 100 --mapping unidirectional`, seeds 1 and 2: relMSE 0.00151 without this and 0.0014
+/// with it, by `--method path` 0.00137.)
 const LEAST_NOISE: f64 = 1.0;
-/// Error, by that of path tracing, by which chains that had not promised anything get a say after all. (On `cornell-box` a
-/// first round told 0.62 where there was nothing to gain.)
+/// Error, by that of path tracing, from which down chains that had not promised anything get a say after all. (The first
+/// round of the run above told 0.62, where there was nothing to gain.)
 const SURPRISE: f64 = 0.25;
 
 impl<W: Default + Send> Sampler<W> {
@@ -66,12 +69,12 @@ impl<W: Default + Send> Sampler<W> {
     pub(super) fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
         self.flush();
         let learnt = self.learn();
-        self.image_correlation = self.measured(&learnt).and_then(|measured| measured.correlation());
+        self.state.image_correlation = self.measured(&learnt).and_then(|measured| measured.correlation());
         let mut report = self.report(&learnt);
-        let choices = match (self.schedule.round, learnt.normalisers.target.ln_value.is_finite()) {
+        let choices = match (self.state.schedule.round, learnt.normalisers.target.ln_value.is_finite()) {
             // nothing lit yet: nothing to start chains from, nothing else to do but to go on
             (0, false) => {
-                self.schedule.length *= 2;
+                self.state.schedule.length *= 2;
                 return;
             }
             (0, true) if self.weighs() && self.importance.is_none() => {
@@ -79,12 +82,12 @@ impl<W: Default + Send> Sampler<W> {
                 return;
             }
             (0, true) => self.raise_ladders(target, &learnt),
-            _ if self.schedule.frozen => Vec::new(),
+            _ if self.state.schedule.frozen => Vec::new(),
             _ => self.adapt(&learnt),
         };
         report.choices = choices;
         report.image_share_before =
-            self.schedule.frozen.then(|| self.schedule.learning as f64 / self.evaluations as f64);
+            self.state.schedule.frozen.then(|| self.state.schedule.learning as f64 / self.state.evaluations as f64);
         self.reports.push(report);
         self.begin_round(&learnt);
     }
@@ -98,7 +101,7 @@ impl<W: Default + Send> Sampler<W> {
             sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
         }
         // sums may be beyond f32 where their terms are not
-        let luminance = |[r, g, b, points]: [f64; 4]| [0.299 * r + 0.587 * g + 0.114 * b, points];
+        let luminance = |[r, g, b, points]: [f64; 4]| [luminance_of_sums([r, g, b]), points];
         let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
         let importance = Arc::new(Importance::new(self.screen.size, &found));
         for portion in &mut self.portions {
@@ -108,13 +111,13 @@ impl<W: Default + Send> Sampler<W> {
         self.importance = Some(importance);
         self.screen.groups.forget_histograms();
         let a_sweep = self.a_sweep();
-        self.schedule.length =
-            self.schedule.done + at_most(super::BOOTSTRAP, self.planned, 1.0 / 32.0).div_ceil(a_sweep);
+        self.state.schedule.length =
+            self.state.schedule.done + at_most(super::BOOTSTRAP, self.planned, 1.0 / 32.0).div_ceil(a_sweep);
     }
 
     /// Records what states have gathered; the round's settings still hold.
     fn flush(&mut self) {
-        let (screen, round) = (&self.screen, &self.round);
+        let (screen, round) = (&self.screen, &self.state.round);
         self.portions.par_iter_mut().for_each(|portion| {
             if let Some(block) = &mut portion.ladders {
                 block.flush(&screen.canvas(), round);
@@ -143,24 +146,24 @@ impl<W: Default + Send> Sampler<W> {
             pending.get(number).into_iter().for_each(|sum| states.merge(*sum));
             hot.push(points.values());
             // each block's states stand for as much of the image as any other's
-            tempered.push((states.values().0, self.effort / self.portions.len() as f64));
+            tempered.push((states.values().0, self.state.effort / self.portions.len() as f64));
             even.push(all.values());
         }
         let layers = &self.screen.layers;
         let luminance = match (layers.hot, layers.even) {
             (Some(_), _) => {
-                Luminance::Balanced { hot: estimate(&hot), tempered: estimate(&tempered), ln_unit: self.ln_unit }
+                Luminance::Balanced { hot: estimate(&hot), tempered: estimate(&tempered), ln_unit: self.state.ln_unit }
             }
             (None, Some(_)) => Luminance::Mean(estimate(&even)),
             (None, None) => Luminance::Normaliser,
         };
-        Learnt::of(&self.round.ladder, groups, luminance)
+        Learnt::of(&self.state.round.ladder, groups, luminance)
     }
 
     /// Histograms by rung of group `number`: what block `number` of the ladders saw, and stratified points.
     pub(super) fn group(&self, number: usize) -> Vec<Histogram> {
         let portion = &self.portions[number];
-        let mut group = vec![Histogram::default(); self.round.ladder.rungs()];
+        let mut group = vec![Histogram::default(); self.state.round.ladder.rungs()];
         self.screen.groups.add_to(number, &mut group[0]);
         group.iter_mut().zip(&portion.past).for_each(|(sum, past)| sum.merge(past));
         if let Some(block) = &portion.ladders {
@@ -173,16 +176,16 @@ impl<W: Default + Send> Sampler<W> {
     fn raise_ladders<T: Target<Workspace = W>>(&mut self, target: &T, learnt: &Learnt) -> Vec<String> {
         let density = &learnt.density;
         let barrier = density.barrier();
-        self.round.ladder = match &self.choices.ladder {
+        self.state.round.ladder = match &self.choices.ladder {
             LadderChoice::Auto => density.place(rungs(barrier).min(MOST_AUTOMATIC)),
             LadderChoice::Replicas(k) => density.place(*k as usize),
             LadderChoice::Betas(betas) => Ladder::new(betas.clone()),
         };
-        let ladder = &self.round.ladder;
+        let ladder = &self.state.round.ladder;
         let chains = ladder.chains();
-        self.ln_unit = learnt.normalisers.target.ln_value;
-        self.offers = 1;
-        let remaining = self.planned.map(|wanted| wanted.saturating_sub(self.evaluations));
+        self.state.ln_unit = learnt.normalisers.target.ln_value;
+        self.state.offers = 1;
+        let remaining = self.planned.map(|wanted| wanted.saturating_sub(self.state.evaluations));
         let ladders = self.plan.groups_a_block(remaining, 2 * chains);
         let samples: Vec<Start> =
             self.portions.iter_mut().flat_map(|portion| std::mem::take(&mut portion.starts)).collect();
@@ -192,7 +195,7 @@ impl<W: Default + Send> Sampler<W> {
             .enumerate()
             .map(|(rung, &beta)| resample(&samples, beta, all, self.rng, rung as u32))
             .collect();
-        let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.offers, self.screen.size);
+        let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.state.offers, self.screen.size);
         let importance = self.importance.as_ref();
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
@@ -202,17 +205,16 @@ impl<W: Default + Send> Sampler<W> {
             block.start(target, &starts);
             portion.ladders = Some(block);
         });
-        self.ladders_a_block = ladders;
+        self.state.ladders_a_block = ladders;
         self.screen.layers = self.screen.prepared;
-        self.bootstrap = self.points[0];
-        self.rays_a_point = self.uniform_rays.map(|[points, rays]| rays as f64 / (points as f64).max(1.0));
+        self.state.bootstrap = self.state.points[0];
         let noise = self.measured(learnt).and_then(|measured| measured.noise_of_points());
         // no noise at all tells nothing: perhaps no probe has seen light yet
         let quiet = noise.is_some_and(|noise| noise > 0.0 && noise <= LEAST_NOISE);
-        self.promising = self.choices.ladder != LadderChoice::Auto || !quiet;
-        let share = if self.promising { 0.5 } else { MOST_UNIFORM_WITH_CHAINS };
+        self.state.promising = self.choices.ladder != LadderChoice::Auto || !quiet;
+        let share = if self.state.promising { 0.5 } else { MOST_UNIFORM_WITH_CHAINS };
         let share = self.choices.uniform_share.unwrap_or_else(|| self.share_of_evaluations(share));
-        self.choice = Choice { ratio: FIRST_RATIO, share, relative_error: f64::NAN };
+        self.state.choice = Choice { ratio: FIRST_RATIO, share, relative_error: f64::NAN };
         let how = match self.choices.ladder {
             LadderChoice::Auto => format!("{} replicas, as the barrier is {barrier:.2}", chains + 1),
             LadderChoice::Replicas(_) => format!("{} replicas placed at equal rejection", chains + 1),
@@ -233,7 +235,7 @@ impl<W: Default + Send> Sampler<W> {
             said.extend(self.place_anew(learnt));
         }
         if let Some(choice) = choice {
-            self.choice = choice;
+            self.state.choice = choice;
             said.push(match choice.ratio {
                 0.0 => "path tracing: no share of chains makes the error less".into(),
                 ratio => format!(
@@ -243,21 +245,21 @@ impl<W: Default + Send> Sampler<W> {
                 ),
             });
         }
-        if self.choice.ratio == 0.0 {
+        if self.state.choice.ratio == 0.0 {
             self.give_up_ladders();
         } else {
             if last {
                 self.screen.layers.even = None; // never looked at again
             }
             let accepted = counts[1].swaps.acceptance();
-            let most = self.uniform_a_ladder(self.round.ladder.chains()).floor().max(1.0);
-            self.offers = (OFFERS_TAKEN / accepted.max(1e-9)).ceil().min(most) as usize;
-            let (rng, offers) = (self.rng, self.offers);
+            let most = self.uniform_a_ladder(self.state.round.ladder.chains()).floor().max(1.0);
+            self.state.offers = (OFFERS_TAKEN / accepted.max(1e-9)).ceil().min(most) as usize;
+            let (rng, offers) = (self.rng, self.state.offers);
             self.portions.iter_mut().flat_map(|p| &mut p.ladders).for_each(|block| block.set_offers(rng, offers));
         }
-        if last || self.choice.ratio == 0.0 {
-            self.schedule.frozen = true;
-            self.schedule.learning = self.evaluations;
+        if last || self.state.choice.ratio == 0.0 {
+            self.state.schedule.frozen = true;
+            self.state.schedule.learning = self.state.evaluations;
             self.screen.probes = None;
         }
         said
@@ -275,11 +277,11 @@ impl<W: Default + Send> Sampler<W> {
         if noise[best] > CLEARLY_LESS * noise[UNSHIFTED] {
             return None;
         }
-        self.centre = (self.centre + shift(best)).clamp(0.0, (steps::SCALES - 1) as f64);
+        self.state.centre = (self.state.centre + shift(best)).clamp(0.0, (steps::SCALES - 1) as f64);
         Some(format!(
             "{} steps, of about 2^{:.0}: {:.2} times the noise",
             if best < UNSHIFTED { "shorter" } else { "longer" },
-            2.0 * self.centre - 12.0,
+            2.0 * self.state.centre - 12.0,
             noise[best] / noise[UNSHIFTED]
         ))
     }
@@ -288,7 +290,7 @@ impl<W: Default + Send> Sampler<W> {
     fn mixes(&self, counts: &[RungCounts]) -> [Vec<StepMix>; TRIALS] {
         let target = &counts[counts.len() - 1].steps;
         std::array::from_fn(|trial| {
-            let centre = self.centre + if self.schedule.frozen { 0.0 } else { shift(trial) };
+            let centre = self.state.centre + if self.state.schedule.frozen { 0.0 } else { shift(trial) };
             let of_rung = |counts: &RungCounts| {
                 StepMix::about(StepMix::centre_of_equal_acceptance(centre, target, &counts.steps))
             };
@@ -296,27 +298,32 @@ impl<W: Default + Send> Sampler<W> {
         })
     }
 
+    /// Rays of a point that chose and of an open one, as the first sweeps had them.
+    fn rays_a_point(&self) -> [f64; 2] {
+        self.state.first_rays.map(|[points, rays]| rays as f64 / (points as f64).max(1.0))
+    }
+
     /// The share of evaluations that are uniform points, where these have that share of the cost, as far as it is known. Where
     /// points that choose are alike on all rungs, shares of cost are taken for those of evaluations.
     fn share_of_evaluations(&self, of_cost: f64) -> f64 {
-        if !self.open {
+        if !self.state.round.open {
             return of_cost;
         }
-        let [chosen, open] = self.rays_a_point.map(|rays| rays + COST_BESIDE_RAYS);
-        let chain = chosen * (1.0 + self.offers as f64 / self.round.ladder.chains() as f64);
+        let [chosen, open] = self.rays_a_point().map(|rays| rays + COST_BESIDE_RAYS);
+        let chain = chosen * (1.0 + self.state.offers as f64 / self.state.round.ladder.chains() as f64);
         let (points, states) = (of_cost / open, (1.0 - of_cost) / chain);
         points / (points + states)
     }
 
     /// Uniform points a sweep for each ladder of `chains` chains, by the share that is chosen.
     fn uniform_a_ladder(&self, chains: usize) -> f64 {
-        chains as f64 * self.choice.share / (1.0 - self.choice.share)
+        chains as f64 * self.state.choice.share / (1.0 - self.state.choice.share)
     }
 
     /// Whether what is learnt now is the last.
     fn is_last_lesson(&self) -> bool {
-        let next = self.evaluations as f64 + 2.0 * (self.schedule.length * self.a_sweep()) as f64;
-        self.schedule.round >= LEARNING_ROUNDS
+        let next = self.state.evaluations as f64 + 2.0 * (self.state.schedule.length * self.a_sweep()) as f64;
+        self.state.schedule.round >= LEARNING_ROUNDS
             || self.planned.is_some_and(|wanted| next > LEARNING_PART * wanted as f64)
     }
 
@@ -325,10 +332,10 @@ impl<W: Default + Send> Sampler<W> {
         // while chains are to show what they can do they keep a part of the work, less in each round
         let most = match (self.choices.ladder == LadderChoice::Auto, last) {
             // chains that promise nothing after some rounds are not listened to any longer
-            (true, last) if last || self.schedule.round >= ROUNDS_OF_GRACE => 1.0,
+            (true, last) if last || self.state.schedule.round >= ROUNDS_OF_GRACE => 1.0,
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
-            _ if !self.promising => MOST_UNIFORM_WITH_CHAINS,
-            _ => 1.0 - 0.5f64.powi(self.schedule.round as i32 + 1),
+            _ if !self.state.promising => MOST_UNIFORM_WITH_CHAINS,
+            _ => 1.0 - 0.5f64.powi(self.state.schedule.round as i32 + 1),
         };
         let [least, most] = [LEAST_UNIFORM, most].map(|share| self.share_of_evaluations(share));
         let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
@@ -336,15 +343,15 @@ impl<W: Default + Send> Sampler<W> {
         let measured = self.measured(learnt)?;
         let choice = measured.choose(&shares, unmeasured);
         let surprise = choice.relative_error < SURPRISE;
-        let only_watch = !self.promising && !surprise && self.choices.uniform_share.is_none() && most < 1.0;
+        let only_watch = !self.state.promising && !surprise && self.choices.uniform_share.is_none() && most < 1.0;
         Some(if only_watch { measured.choose(&(*shares.end()..=*shares.end()), unmeasured) } else { choice })
     }
 
     /// What the round has measured, if it has.
     fn measured(&self, learnt: &Learnt) -> Option<Measured> {
         let probes = self.screen.probes.as_ref()?;
-        let states = self.ladder_steps(self.schedule.done) as f64;
-        let chains = self.round.ladder.chains() as f64;
+        let states = self.ladder_steps(self.state.schedule.done) as f64;
+        let chains = self.state.round.ladder.chains() as f64;
         let pixels = f64::from(self.screen.size[0]) * f64::from(self.screen.size[1]);
         let target = learnt.normalisers.target;
         Some(Measured {
@@ -354,7 +361,7 @@ impl<W: Default + Send> Sampler<W> {
             states: chains * states,
             tempered_scale: match states {
                 0.0 => 0.0,
-                states => pixels * libm::exp(target.ln_value - self.ln_unit) / (0.5 * states),
+                states => pixels * libm::exp(target.ln_value - self.state.ln_unit) / (0.5 * states),
             },
             normaliser_variance: target.relative_error.powi(2),
             measure: self.choices.measure,
@@ -365,20 +372,20 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Cost of a uniform point and of a step of a chain, in rays.
     fn costs(&self, states: f64) -> [f64; 2] {
-        let offered = self.ladder_steps(self.schedule.done) as f64 * self.offers as f64;
-        let [chosen, open] = self.rays_a_point;
-        if self.open {
+        let offered = self.ladder_steps(self.state.schedule.done) as f64 * self.state.offers as f64;
+        let [chosen, open] = self.rays_a_point();
+        if self.state.round.open {
             // offered points add nothing to the image: chains bear their cost
-            let a_state = (self.ladder_rays as f64 + offered * COST_BESIDE_RAYS) / states.max(1.0);
+            let a_state = (self.state.ladder_rays as f64 + offered * COST_BESIDE_RAYS) / states.max(1.0);
             return [open + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS];
         }
-        let a_state = (self.ladder_rays as f64 - offered * chosen).max(0.0) / states.max(1.0);
+        let a_state = (self.state.ladder_rays as f64 - offered * chosen).max(0.0) / states.max(1.0);
         [chosen + COST_BESIDE_RAYS, a_state + COST_BESIDE_RAYS]
     }
 
     /// Places rungs at equal rejection, unless they are near enough.
     fn place_anew(&mut self, learnt: &Learnt) -> Option<String> {
-        let ladder = &self.round.ladder;
+        let ladder = &self.state.round.ladder;
         let rejections = |ladder: &Ladder| -> Vec<f64> {
             ladder.betas().windows(2).map(|pair| learnt.density.rejection(pair[0], pair[1])).collect()
         };
@@ -391,8 +398,8 @@ impl<W: Default + Send> Sampler<W> {
         if placed == *ladder {
             return None;
         }
-        self.round.ladder = placed;
-        self.moved = true;
+        self.state.round.ladder = placed;
+        self.state.moved = true;
         Some(format!("rungs placed anew: neighbours rejected {least:.2} to {most:.2} of their swaps"))
     }
 
@@ -404,7 +411,7 @@ impl<W: Default + Send> Sampler<W> {
         }
         for portion in &mut self.portions {
             if let Some(block) = portion.ladders.take() {
-                let mut past = vec![Histogram::default(); self.round.ladder.rungs()];
+                let mut past = vec![Histogram::default(); self.state.round.ladder.rungs()];
                 block.add_histograms(&mut past);
                 portion.past = past;
                 portion.added = block.added();
@@ -417,71 +424,80 @@ impl<W: Default + Send> Sampler<W> {
         let ladders = self.ladders() as usize;
         let density = &learnt.density;
         if ladders > 0 {
-            let ln_zeta: Vec<f64> =
-                self.round.ladder.betas().iter().map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) }).collect();
-            let offered = if self.open { 0.0 } else { self.offers as f64 };
-            let a_sweep = self.uniform_a_ladder(self.round.ladder.chains()) - offered;
-            let points = a_sweep.max(0.0) * self.ladders_a_block as f64;
-            self.schedule.ladder_sweeps = if points < 1.0 { 1 } else { (BATCH / points).ceil().max(1.0) as u64 };
-            self.schedule.points = (points * self.schedule.ladder_sweeps as f64).round() as usize;
-            self.round.weights = Weights::new(&self.round.ladder, &ln_zeta, self.choice.ratio, self.ln_unit);
-            self.round.mixes = self.mixes(&self.counts_by_rung());
+            let ln_zeta: Vec<f64> = self
+                .state
+                .round
+                .ladder
+                .betas()
+                .iter()
+                .map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) })
+                .collect();
+            let offered = if self.state.round.open { 0.0 } else { self.state.offers as f64 };
+            let a_sweep = self.uniform_a_ladder(self.state.round.ladder.chains()) - offered;
+            let points = a_sweep.max(0.0) * self.state.ladders_a_block as f64;
+            self.state.schedule.ladder_sweeps = if points < 1.0 { 1 } else { (BATCH / points).ceil().max(1.0) as u64 };
+            self.state.schedule.points = (points * self.state.schedule.ladder_sweeps as f64).round() as usize;
+            self.state.round.weights =
+                Weights::new(&self.state.round.ladder, &ln_zeta, self.state.choice.ratio, self.state.ln_unit);
+            self.state.round.mixes = self.mixes(&self.counts_by_rung());
         } else {
-            self.schedule.points = self.plan.lanes();
-            self.round.weights = Weights::uniform_alone();
+            self.state.schedule.points = self.plan.lanes();
+            self.state.round.weights = Weights::uniform_alone();
         }
         let a_sweep = self.a_sweep() as f64;
         let points = (self.portions.len() * self.points_a_block()) as f64;
-        self.round.effort = [a_sweep / points, if ladders > 0 { a_sweep / self.ladder_steps(1) as f64 } else { 0.0 }];
+        self.state.round.effort =
+            [a_sweep / points, if ladders > 0 { a_sweep / self.ladder_steps(1) as f64 } else { 0.0 }];
         for portion in &mut self.portions {
             portion.tally.reset_counts();
             if let Some(block) = &mut portion.ladders {
                 block.reset_counts();
-                if self.moved {
+                if self.state.moved {
                     block.forget_tempered();
                 }
             }
         }
-        self.moved = false;
+        self.state.moved = false;
         if self.screen.probes.is_some() {
             self.screen.probes = Some(Probes::new(&self.screen.map, self.screen.unit));
         }
-        self.ladder_rays = 0;
-        self.schedule.round += 1;
-        let evaluations = match (self.schedule.round, self.schedule.frozen) {
+        self.state.ladder_rays = 0;
+        self.state.schedule.round += 1;
+        let evaluations = match (self.state.schedule.round, self.state.schedule.frozen) {
             (1, _) => {
                 let pixels = u64::from(self.screen.size[0]) * u64::from(self.screen.size[1]);
                 let first = FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels);
                 // both halves need a stratified point in every pixel
-                let passes = if self.open { (2.0 * pixels as f64 / self.uniform_share()) as u64 } else { 0 };
+                let passes =
+                    if self.state.round.open { (2.0 * pixels as f64 / self.uniform_share()) as u64 } else { 0 };
                 at_most(first, self.planned, LEARNING_PART / 4.0).max(at_most(passes, self.planned, LEARNING_PART))
             }
-            (_, false) => 2 * self.schedule.evaluations,
+            (_, false) => 2 * self.state.schedule.evaluations,
             // as long as all that came before
-            (_, true) => self.evaluations,
+            (_, true) => self.state.evaluations,
         };
-        self.schedule.evaluations = evaluations;
-        self.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
-        self.schedule.done = 0;
+        self.state.schedule.evaluations = evaluations;
+        self.state.schedule.length = evaluations.div_ceil(self.a_sweep()).max(1);
+        self.state.schedule.done = 0;
         let sweeps = self.portions[0].ladders.as_ref().map_or(0, Block::sweeps);
-        self.round.only_offers = self.schedule.points == 0;
-        self.round.half = sweeps + self.schedule.middle() * self.schedule.ladder_sweeps;
+        self.state.round.only_offers = self.state.schedule.points == 0;
+        self.state.round.half = sweeps + self.state.schedule.middle() * self.state.schedule.ladder_sweeps;
     }
 
     /// Uniform points of a block in a sweep, offered or not.
     pub(super) fn points_a_block(&self) -> usize {
-        let ladders = if self.ladders() > 0 && !self.open { self.ladders_a_block } else { 0 };
-        self.offers * ladders * self.schedule.ladder_sweeps as usize + self.schedule.points
+        let ladders = if self.ladders() > 0 && !self.state.round.open { self.state.ladders_a_block } else { 0 };
+        self.state.offers * ladders * self.state.schedule.ladder_sweeps as usize + self.state.schedule.points
     }
 
     /// States on each rung of all ladders in so many sweeps.
     pub(super) fn ladder_steps(&self, sweeps: u64) -> u64 {
-        sweeps * self.schedule.ladder_sweeps * self.ladders()
+        sweeps * self.state.schedule.ladder_sweeps * self.ladders()
     }
 
     /// Counts of the round, by rung.
     pub(super) fn counts_by_rung(&self) -> Vec<RungCounts> {
-        let mut sums = vec![RungCounts::default(); self.round.ladder.rungs()];
+        let mut sums = vec![RungCounts::default(); self.state.round.ladder.rungs()];
         for portion in &self.portions {
             sums[0].add(&portion.tally.counts[0]);
             if let Some(block) = &portion.ladders {

@@ -7,48 +7,25 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{Portion, Sampler, Schedule, Setup, most_rungs, rounds::LANES_A_PART};
+use super::{Portion, Sampler, Setup, State, most_rungs, rounds::LANES_A_PART};
 use crate::{
     chain::{Importance, Start},
     film::Accumulator,
-    path::Faults,
     rng::Purpose,
     saved::{Source, Unfit, expect, write_value},
-    tempering::{
-        Block, Histogram, Layers, PointGroups, Probes, Round, SavedBlock, SavedTally, Seen, Sum, tuning::Choice,
-    },
+    tempering::{Block, Histogram, Layers, PointGroups, Probes, SavedBlock, SavedTally, Seen, Sum},
 };
 
 /// All of a [`Sampler`] but for its portions and its film, and for what follows from its [`Setup`].
 #[derive(Serialize, Deserialize)]
 struct SavedSampler {
-    round: Round,
-    schedule: Schedule,
+    state: State,
     importance: Option<Importance>,
     groups: Vec<Seen>,
     /// The film still has the layers of the balanced and of the stratified points, and there are probes.
     has_hot: bool,
     has_even: bool,
     has_probes: bool,
-    ln_unit: f64,
-    offers: usize,
-    ladders_a_block: usize,
-    choice: Choice,
-    centre: f64,
-    moved: bool,
-    ladder_rays: u64,
-    effort: f64,
-    image_correlation: Option<f64>,
-    states_a_rung: u64,
-    bootstrap: u64,
-    points: [u64; 2],
-    promising: bool,
-    uniform_rays: [[u64; 2]; 2],
-    rays_a_point: [f64; 2],
-    sweeps: u64,
-    evaluations: u64,
-    faults: Faults,
-    rays: u64,
 }
 
 /// A [`Portion`] as it is saved.
@@ -66,35 +43,15 @@ impl<W: Default + Send> Sampler<W> {
     /// Writes all that it takes to go on from here, as if nothing had been between; reports that nobody has taken yet are
     /// not kept.
     pub fn save(&self, out: &mut dyn Write) -> io::Result<()> {
-        let state = SavedSampler {
-            round: self.round.clone(),
-            schedule: self.schedule,
+        let saved = SavedSampler {
+            state: self.state.clone(),
             importance: self.importance.as_deref().cloned(),
             groups: self.screen.groups.saved(),
             has_hot: self.screen.layers.hot.is_some(),
             has_even: self.screen.layers.even.is_some(),
             has_probes: self.screen.probes.is_some(),
-            ln_unit: self.ln_unit,
-            offers: self.offers,
-            ladders_a_block: self.ladders_a_block,
-            choice: self.choice,
-            centre: self.centre,
-            moved: self.moved,
-            ladder_rays: self.ladder_rays,
-            effort: self.effort,
-            image_correlation: self.image_correlation,
-            states_a_rung: self.states_a_rung,
-            bootstrap: self.bootstrap,
-            points: self.points,
-            promising: self.promising,
-            uniform_rays: self.uniform_rays,
-            rays_a_point: self.rays_a_point,
-            sweeps: self.sweeps,
-            evaluations: self.evaluations,
-            faults: self.faults.clone(),
-            rays: self.rays,
         };
-        write_value(out, &state)?;
+        write_value(out, &saved)?;
         for portion in &self.portions {
             let saved = SavedPortion {
                 uniform: portion.uniform.saved(),
@@ -116,33 +73,26 @@ impl<W: Default + Send> Sampler<W> {
         let layers = Layers::of(&setup.choices, most_rungs(&setup.choices), setup.elsewhere).count as u64;
         expect(Accumulator::fewest_bytes(pixels, layers) <= from.left(), "film")?;
         let mut sampler = Sampler::new(setup);
-        let state: SavedSampler = from.value()?;
+        let saved: SavedSampler = from.value()?;
         let screen = &mut sampler.screen;
-        screen.layers.hot = screen.prepared.hot.filter(|_| state.has_hot);
-        screen.layers.even = screen.prepared.even.filter(|_| state.has_even);
-        expect(state.groups.len() == sampler.portions.len(), "groups of points")?;
-        screen.groups = PointGroups::restored(state.groups);
-        screen.probes = state.has_probes.then(|| Probes::new(&screen.map, screen.unit));
-        expect(state.importance.as_ref().is_none_or(|importance| importance.fits(screen.size)), "importance")?;
-        let SavedSampler { round, schedule, offers, ladders_a_block, .. } = state;
+        screen.layers.hot = screen.prepared.hot.filter(|_| saved.has_hot);
+        screen.layers.even = screen.prepared.even.filter(|_| saved.has_even);
+        expect(saved.groups.len() == sampler.portions.len(), "groups of points")?;
+        screen.groups = PointGroups::restored(saved.groups);
+        screen.probes = saved.has_probes.then(|| Probes::new(&screen.map, screen.unit));
+        expect(saved.importance.as_ref().is_none_or(|importance| importance.fits(screen.size)), "importance")?;
+        let State { round, offers, ladders_a_block, .. } = &saved.state;
         let (rungs, chains) = (round.ladder.rungs(), round.ladder.chains());
         let most_ladders = if chains > 0 { sampler.plan.groups_a_block(None, 2 * chains) } else { 0 };
-        let at_work = ladders_a_block <= most_ladders && chains + offers <= usize::from(u16::MAX);
+        let at_work = *ladders_a_block <= most_ladders && chains + offers <= usize::from(u16::MAX);
         expect(rungs <= most_rungs(&sampler.choices) && at_work, "ladders")?;
-        (sampler.round, sampler.schedule, sampler.offers) = (round, schedule, offers);
-        sampler.importance = state.importance.map(Arc::new);
-        sampler.ladders_a_block = ladders_a_block;
-        (sampler.ln_unit, sampler.choice, sampler.centre) = (state.ln_unit, state.choice, state.centre);
-        (sampler.moved, sampler.ladder_rays, sampler.effort) = (state.moved, state.ladder_rays, state.effort);
-        (sampler.image_correlation, sampler.states_a_rung) = (state.image_correlation, state.states_a_rung);
-        (sampler.bootstrap, sampler.points, sampler.promising) = (state.bootstrap, state.points, state.promising);
-        (sampler.uniform_rays, sampler.rays_a_point) = (state.uniform_rays, state.rays_a_point);
-        (sampler.sweeps, sampler.evaluations) = (state.sweeps, state.evaluations);
-        (sampler.faults, sampler.rays) = (state.faults, state.rays);
+        expect(round.open == sampler.state.round.open, "points")?;
+        sampler.importance = saved.importance.map(Arc::new);
+        sampler.state = saved.state;
         for number in 0..sampler.portions.len() {
             sampler.restore_portion(number, from.value()?)?;
         }
-        expect(sampler.a_sweep() > 0 && sampler.schedule.done <= sampler.schedule.length, "schedule")?;
+        expect(sampler.a_sweep() > 0 && sampler.state.schedule.done <= sampler.state.schedule.length, "schedule")?;
         sampler.screen.film.restore(from)?;
         sampler.screen.probes.as_mut().map_or(Ok(()), |probes| probes.restore(from))?;
         Ok(sampler)
@@ -150,16 +100,23 @@ impl<W: Default + Send> Sampler<W> {
 
     fn restore_portion(&mut self, number: usize, saved: SavedPortion) -> Result<(), Unfit> {
         let (rng, size, layers) = (self.rng, self.screen.size, self.screen.prepared.count);
-        let rungs = self.round.ladder.rungs();
+        let rungs = self.state.round.ladder.rungs();
         let Portion { uniform, tally, ladders, past, added, starts } = &mut self.portions[number];
         uniform.restore(saved.uniform)?;
         self.importance.iter().for_each(|importance| uniform.set_importance(importance));
         tally.restore(saved.tally)?;
         if let Some(saved) = saved.ladders {
-            let mixes = self.round.mixes.iter().all(|mixes| mixes.len() == rungs);
-            expect(rungs > 1 && self.ladders_a_block > 0 && self.offers > 0 && mixes, "ladders")?;
-            let mut block =
-                Block::new(rng, (number, self.ladders_a_block), rungs, self.offers, LANES_A_PART, layers, size);
+            let mixes = self.state.round.mixes.iter().all(|mixes| mixes.len() == rungs);
+            expect(rungs > 1 && self.state.ladders_a_block > 0 && self.state.offers > 0 && mixes, "ladders")?;
+            let mut block = Block::new(
+                rng,
+                (number, self.state.ladders_a_block),
+                rungs,
+                self.state.offers,
+                LANES_A_PART,
+                layers,
+                size,
+            );
             block.set_importance(self.importance.as_ref());
             block.restore(saved)?;
             *ladders = Some(block);
