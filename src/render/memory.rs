@@ -15,7 +15,7 @@ pub struct FilmMemory {
     pub size: [u32; 2],
     /// Layers that sums are kept in.
     pub layers: usize,
-    /// Bytes of these sums, all run long.
+    /// Bytes of these sums, all run long; of those of all parts that one process goes through.
     pub sums: u64,
     /// Bytes of them and of the picture that is made of them in the end.
     pub most: u64,
@@ -51,7 +51,8 @@ impl FilmMemory {
             }
         };
         let pixels = u64::from(film.width) * u64::from(film.height);
-        let sums = pixels * (Accumulator::BYTES_PER_PIXEL * layers) as u64;
+        let films = settings.parts.numbers().count() as u64;
+        let sums = films * pixels * (Accumulator::BYTES_PER_PIXEL * layers) as u64;
         let picture = pixels * (BYTES_OF_PICTURE_A_LAYER * layers as u64 + BYTES_OF_PICTURE);
         FilmMemory { size: [film.width, film.height], layers, sums, most: sums + picture }
     }
@@ -115,6 +116,7 @@ mod tests {
     use super::*;
     use crate::film::Filter;
     use crate::path::MappingKind;
+    use crate::render::Parts;
 
     #[test]
     fn films_take_what_their_layers_take() {
@@ -128,6 +130,10 @@ mod tests {
         assert_eq!(of(Method::Path, MappingKind::TwoWay).layers, 2);
         assert_eq!(of(Method::Mlt, MappingKind::TwoWay).layers, 1);
         assert!(of(Method::ReplicaExchange, MappingKind::TwoWay).layers > 2);
+        let parts = Settings { parts: Parts { of: 3, only: None }, method: Method::Path, ..Settings::default() };
+        let part = Settings { parts: Parts { of: 3, only: Some(2) }, ..parts.clone() };
+        let [all, one] = [parts, part].map(|settings| FilmMemory::of(&film, &settings).sums);
+        assert_eq!(all, 3 * one);
         let auto = FilmMemory::of(&film, &Settings::default());
         assert_eq!(auto, of(Method::ReplicaExchange, MappingKind::Bidirectional), "the mapping that takes most");
         assert!(memory.fault(memory.most).is_none());
