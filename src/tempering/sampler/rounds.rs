@@ -48,6 +48,10 @@ fn shift(trial: usize) -> f64 {
 
 /// Independent points that a block should draw at a time.
 const BATCH: f64 = 256.0;
+/// The same of open points, each of which is many connections.
+const OPEN_BATCH: f64 = 16.0;
+/// Sweeps of ladders in which they are drawn, at most: a run ends and is looked at between those.
+const MOST_LADDER_SWEEPS: f64 = 256.0;
 /// What a state counts for in the first round, before that is measured.
 const FIRST_RATIO: f64 = 0.25;
 /// Share of uniform points, at least, and at most where chains are asked for.
@@ -315,6 +319,12 @@ impl<W: Default + Send> Sampler<W> {
         points / (points + states)
     }
 
+    /// Stratified points of which both halves of a round have one in every pixel.
+    fn two_passes(&self) -> f64 {
+        let [width, height] = self.screen.size;
+        2.0 * f64::from(width) * f64::from(height)
+    }
+
     /// Uniform points a sweep for each ladder of `chains` chains, by the share that is chosen.
     fn uniform_a_ladder(&self, chains: usize) -> f64 {
         chains as f64 * self.state.choice.share / (1.0 - self.state.choice.share)
@@ -338,6 +348,12 @@ impl<W: Default + Send> Sampler<W> {
             _ => 1.0 - 0.5f64.powi(self.state.schedule.round as i32 + 1),
         };
         let [least, most] = [LEAST_UNIFORM, most].map(|share| self.share_of_evaluations(share));
+        // what the next round is to learn takes a point in every pixel and half
+        let seen = match self.state.round.open && !last {
+            true => self.two_passes() / (2 * self.state.schedule.evaluations) as f64,
+            false => 0.0,
+        };
+        let least = least.max(seen).min(most);
         let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
         let unmeasured = self.share_of_evaluations(0.5);
         let measured = self.measured(learnt)?;
@@ -432,11 +448,19 @@ impl<W: Default + Send> Sampler<W> {
                 .iter()
                 .map(|b| if *b == 0.0 { 0.0 } else { density.ln_z(*b) })
                 .collect();
-            let offered = if self.state.round.open { 0.0 } else { self.state.offers as f64 };
+            let open = self.state.round.open;
+            let offered = if open { 0.0 } else { self.state.offers as f64 };
             let a_sweep = self.uniform_a_ladder(self.state.round.ladder.chains()) - offered;
             let points = a_sweep.max(0.0) * self.state.ladders_a_block as f64;
-            self.state.schedule.ladder_sweeps = if points < 1.0 { 1 } else { (BATCH / points).ceil().max(1.0) as u64 };
-            self.state.schedule.points = (points * self.state.schedule.ladder_sweeps as f64).round() as usize;
+            let ladder_sweeps = match open {
+                true => (OPEN_BATCH / points).ceil().clamp(1.0, MOST_LADDER_SWEEPS),
+                false if points < 1.0 => 1.0,
+                false => (BATCH / points).ceil().max(1.0),
+            };
+            // without open points their part of the image would be missing: nothing stands in for them
+            let fewest = if open { 1.0 } else { 0.0 };
+            self.state.schedule.ladder_sweeps = ladder_sweeps as u64;
+            self.state.schedule.points = (points * ladder_sweeps).round().max(fewest) as usize;
             self.state.round.weights =
                 Weights::new(&self.state.round.ladder, &ln_zeta, self.state.choice.ratio, self.state.ln_unit);
             self.state.round.mixes = self.mixes(&self.counts_by_rung());
@@ -468,8 +492,7 @@ impl<W: Default + Send> Sampler<W> {
                 let pixels = u64::from(self.screen.size[0]) * u64::from(self.screen.size[1]);
                 let first = FIRST_ROUND.max(FIRST_ROUND_A_PIXEL * pixels);
                 // both halves need a stratified point in every pixel
-                let passes =
-                    if self.state.round.open { (2.0 * pixels as f64 / self.uniform_share()) as u64 } else { 0 };
+                let passes = if self.state.round.open { (self.two_passes() / self.uniform_share()) as u64 } else { 0 };
                 at_most(first, self.planned, LEARNING_PART / 4.0).max(at_most(passes, self.planned, LEARNING_PART))
             }
             (_, false) => 2 * self.state.schedule.evaluations,
