@@ -32,8 +32,7 @@ impl Cumulative {
     #[inline(always)]
     pub fn choose(&self, u: f32) -> (usize, f32) {
         let i = self.index(u);
-        let start = self.start(i);
-        (i, ((u - start) / (self.ends[i] - start)).clamp(0.0, 1.0))
+        (i, place_within(u, self.range(i)))
     }
 
     /// The number whose share holds `u`.
@@ -49,6 +48,7 @@ impl Cumulative {
     }
 
     /// The numbers for which [`choose`](Cumulative::choose) gives number `i`: from the first to before the second.
+    #[inline(always)]
     pub fn range(&self, i: usize) -> [f32; 2] {
         [self.start(i), self.ends[i]]
     }
@@ -57,6 +57,12 @@ impl Cumulative {
     fn start(&self, i: usize) -> f32 {
         if i == 0 { 0.0 } else { self.ends[i - 1] }
     }
+}
+
+/// Where in the share from `start` to `end` the number `u` lies, within [0, 1].
+#[inline(always)]
+pub fn place_within(u: f32, [start, end]: [f32; 2]) -> f32 {
+    ((u - start) / (end - start)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

@@ -1,11 +1,16 @@
 //! Proposed points, drawn block by block as paths reach them.
 
+use pulp::NullaryFnOnce;
+
 use super::{
     Block, LIGHT_STREAM, Points, StepLaw,
     sobol::{self, LOW_DISCREPANCY_BLOCKS},
     strata::within_pixel,
 };
-use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
+use crate::{
+    math::widest,
+    rng::{Counter, Rng, SIDE_BY_SIDE},
+};
 
 /// How a lane's proposal comes about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,8 +69,12 @@ impl Proposals<'_> {
     }
 
     /// Draws block `block` for each of `lanes`.
-    #[inline]
     pub fn draw(&mut self, block: u16, lanes: &[u32]) {
+        widest(Draw { proposals: self, block, lanes });
+    }
+
+    #[inline(always)]
+    fn draw_all(&mut self, block: u16, lanes: &[u32]) {
         self.points.reserve(block);
         let (together, rest) = lanes.as_chunks::<SIDE_BY_SIDE>();
         for lanes in together {
@@ -91,7 +100,7 @@ impl Proposals<'_> {
     }
 
     /// Draws a block for one lane.
-    #[inline]
+    #[inline(always)]
     fn draw_one(&mut self, block: u16, lane: u32) {
         let counter = self.counters[lane as usize];
         let words = if self.low_discrepancy(block, lane) {
@@ -138,6 +147,22 @@ impl Proposals<'_> {
     #[inline(always)]
     pub fn block(&self, block: u16, lane: usize) -> Block {
         self.points.block(block, lane)
+    }
+}
+
+/// The work of [`Proposals::draw`].
+struct Draw<'d, 'p> {
+    proposals: &'d mut Proposals<'p>,
+    block: u16,
+    lanes: &'d [u32],
+}
+
+impl NullaryFnOnce for Draw<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.proposals.draw_all(self.block, self.lanes);
     }
 }
 

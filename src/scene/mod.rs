@@ -25,6 +25,7 @@ pub use emitters::Emitters;
 pub use features::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
 pub use surface::{NO_LIGHT, Surface};
+pub(crate) use surface::on_triangle;
 
 use crate::embree;
 use description::{FilmDescription, Integrator, ShapeDescription, ShapeGeometry, Sides};

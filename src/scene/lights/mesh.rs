@@ -19,8 +19,32 @@ pub struct MeshLight {
     mesh: Arc<Mesh>,
     /// In proportion to area.
     triangles: Cumulative,
+    /// Where they lie, triangle by triangle.
+    faces: Vec<Face>,
     inverse_area: f32,
     radiance: Varying,
+}
+
+/// A triangle as [`MeshLight::place`] needs it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Face {
+    /// The first corner, and what leads from there to the second and the third.
+    pub corner_and_edges: [Vec3; 3],
+    /// Unit normal of the front.
+    pub normal: Vec3,
+}
+
+impl Face {
+    fn new([a, b, c]: [Vec3; 3]) -> Face {
+        let (e1, e2) = (b - a, c - a);
+        Face { corner_and_edges: [a, e1, e2], normal: e1.cross(e2).normalize() }
+    }
+}
+
+/// The point of a triangle, given by a corner and two edges, with barycentric coordinates (1 − b − c, b, c).
+#[inline(always)]
+pub(crate) fn on_face([corner, e1, e2]: [Vec3; 3], [b, c]: [f32; 2]) -> Vec3 {
+    corner + e1 * b + e2 * c
 }
 
 impl PartialEq for MeshLight {
@@ -34,7 +58,13 @@ impl MeshLight {
     pub fn new(mesh: Arc<Mesh>, radiance: Varying) -> MeshLight {
         let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
         let total: f64 = areas.iter().sum();
-        MeshLight { mesh, triangles: Cumulative::new(areas.into_iter()), inverse_area: (1.0 / total) as f32, radiance }
+        MeshLight {
+            triangles: Cumulative::new(areas.into_iter()),
+            faces: (0..mesh.triangles.len() as u32).map(|t| Face::new(mesh.corners(t))).collect(),
+            inverse_area: (1.0 / total) as f32,
+            mesh,
+            radiance,
+        }
     }
 
     /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance. The
@@ -43,11 +73,31 @@ impl MeshLight {
     fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
         let (triangle, within) = self.triangles.choose(u[0]);
         let [b, c] = warp::triangle([within, u[1]]);
-        let [p0, p1, p2] = self.mesh.corners(triangle as u32);
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let n = e1.cross(e2).normalize();
-        let normals = [n, self.mesh.shading_normal(triangle as u32, b, c, n)];
-        (p0 + e1 * b + e2 * c, normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
+        let face = &self.faces[triangle];
+        let normals = [face.normal, self.mesh.shading_normal(triangle as u32, b, c, face.normal)];
+        (on_face(face.corner_and_edges, [b, c]), normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
+    }
+
+    /// The triangle that a number chooses and the range of the numbers that choose it.
+    #[inline(always)]
+    pub(crate) fn face(&self, u: f32) -> (&Face, [f32; 2]) {
+        let triangle = self.triangles.index(u);
+        (&self.faces[triangle], self.triangles.range(triangle))
+    }
+
+    /// Its radiance, which is the same everywhere.
+    ///
+    /// # Panics
+    /// If it is textured.
+    #[inline(always)]
+    pub(crate) fn constant_radiance(&self) -> Rgb {
+        self.radiance.at(|| unreachable!("a profile without textures"))
+    }
+
+    /// 1 / area.
+    #[inline(always)]
+    pub(crate) fn inverse_area(&self) -> f32 {
+        self.inverse_area
     }
 
     /// The inverse of [`place`](Self::place).
