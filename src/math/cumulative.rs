@@ -38,7 +38,11 @@ impl Cumulative {
     /// The number whose share holds `u`.
     #[inline(always)]
     pub fn index(&self, u: f32) -> usize {
-        self.ends.partition_point(|&end| end <= u).min(self.ends.len() - 1)
+        let below = match self.ends.len() {
+            2 => usize::from(self.ends[0] <= u) + usize::from(self.ends[1] <= u), // a lamp of two triangles
+            _ => self.ends.partition_point(|&end| end <= u),
+        };
+        below.min(self.ends.len() - 1)
     }
 
     /// The share of number `i`: exactly the probability with which [`choose`](Cumulative::choose) gives it.

@@ -1,4 +1,5 @@
-//! Loops over lanes, compiled more than once: for every x86-64 processor, and for those with AVX2.
+//! Loops over lanes, compiled more than once: for every x86-64 processor, and for those with
+//! AVX2 or AVX-512.
 //!
 //! One program runs everywhere and takes the wider instructions where there are any. The bits are the same: all
 //! versions come from the same code, IEEE 754 fixes what each operation gives, and the compiler never fuses a
@@ -21,6 +22,8 @@ pub fn in_use() -> &'static str {
         Arch::Scalar => "those of every processor of the kind",
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Arch::V3(_) => "AVX2",
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Arch::V4(_) => "AVX-512",
         _ => "wider ones",
     }
 }

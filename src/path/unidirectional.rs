@@ -100,7 +100,7 @@ pub(super) fn evaluate<P: Profile>(
         if let Some(block) = mapping.layout().choices(bounce) {
             proposals.draw(block, &w.hit_lanes);
         }
-        if P::DIFFUSE && P::FLAT_MESHES {
+        if P::FLAT_MESHES && !P::VARYING {
             widest(side_by_side::Shade::<P>::new(mapping, bounce, proposals, w));
         } else {
             shade::<P>(mapping, bounce, proposals, w);
@@ -147,31 +147,42 @@ fn keep_hits<P: Profile>(scene: &Scene, w: &mut Arrays) {
 /// At every hit: emission, a light to connect to, and the next edge. The edges of the paths that go on replace the
 /// ones that led here.
 fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &mut Arrays) {
-    let (scene, layout) = (mapping.scene(), mapping.layout());
-    let (first, choices) = (layout.bounce(bounce), layout.choices(bounce));
     w.begin_bounce();
     let mut kept = 0;
     let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
     for (&slot, &lane) in slots.iter().zip(&lanes) {
-        let i = slot as usize;
-        let carried = w.carried[i];
-        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
-        let hit = w.hits.get(i).expect("misses are gone");
-        let surface = scene.surface::<P>(hit, origin, direction);
-        w.radiance[lane as usize] += vertex::emission::<P>(scene, &surface, origin, &carried);
-
-        let choices = choices.map(|block| proposals.block(block, lane as usize));
-        let decisions = Decisions::new(layout, bounce, proposals.block(first, lane as usize), choices);
-        if let Some(c) = vertex::connection::<P>(scene, &surface, &carried, &decisions) {
-            w.connect(lane, &c);
-        }
-        if let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) {
-            w.go_on(kept, lane, &edge);
-            kept += 1;
-        }
+        kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
     }
     w.end_bounce(kept);
     (w.hit_slots, w.hit_lanes) = (slots, lanes);
+}
+
+/// At one hit; returns how many paths have gone on then, `kept` before.
+#[inline(always)]
+fn shade_one<P: Profile>(
+    mapping: &Mapping,
+    bounce: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    [slot, lane]: [u32; 2],
+    kept: usize,
+) -> usize {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
+    let i = slot as usize;
+    let carried = w.carried[i];
+    let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+    let hit = w.hits.get(i).expect("misses are gone");
+    let surface = scene.surface::<P>(hit, origin, direction);
+    w.radiance[lane as usize] += vertex::emission::<P>(scene, &surface, origin, &carried);
+
+    let choices = layout.choices(bounce).map(|block| proposals.block(block, lane as usize));
+    let decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), lane as usize), choices);
+    if let Some(c) = vertex::connection::<P>(scene, &surface, &carried, &decisions) {
+        w.connect(lane, &c);
+    }
+    let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) else { return kept };
+    w.go_on(kept, lane, &edge);
+    kept + 1
 }
 
 /// Adds the lights that are seen.

@@ -55,11 +55,6 @@ pub(super) struct Edge {
     pub carried: Carried,
 }
 
-impl Edge {
-    /// Stands where there is none.
-    pub const NONE: Edge = Edge { origin: Vec3::ZERO, direction: Vec3::ZERO, carried: Carried::START };
-}
-
 /// The primary samples of one bounce.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Decisions {
@@ -204,11 +199,13 @@ pub(super) fn scatter<P: Profile>(
     roulette: Roulette,
 ) -> Option<Edge> {
     let sample = surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
-    scattered((surface.p, surface.lift, &surface.frame), sample, carried, decisions.roulette, roulette)
+    let from = (surface.p, surface.lift, &surface.frame);
+    let (edge, goes_on) = scattered(from, sample, carried, decisions.roulette, roulette);
+    goes_on.then_some(edge)
 }
 
-/// The edge in a direction that scattering has chosen, from a point with that [`lift`](Surface::lift) and frame, unless
-/// roulette ends the path; `u` is its number where it is played.
+/// The edge in a direction that scattering has chosen, from a point with that [`lift`](Surface::lift) and frame, and
+/// whether the path goes on; `u` is the number of roulette where it is played. Without a branch, for loops over lanes.
 #[inline(always)]
 pub(super) fn scattered(
     (p, lift, frame): (Vec3, Vec3, &Frame),
@@ -216,26 +213,23 @@ pub(super) fn scattered(
     carried: &Carried,
     u: Option<f32>,
     roulette: Roulette,
-) -> Option<Edge> {
+) -> (Edge, bool) {
     let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta, ..*carried };
+    let mut goes_on = true;
     if let Some(u) = u {
         let left = match roulette {
             Roulette::Vertex => weight * (eta * eta),
             Roulette::Path => next.throughput * (next.eta * next.eta),
         };
         let survival = left.max_element().min(MOST_SURVIVAL);
-        if u >= survival {
-            return None;
-        }
+        goes_on = u < survival;
         next.throughput /= survival;
         next.survival *= survival;
     }
-    if next.throughput == Rgb::ZERO {
-        return None;
-    }
+    goes_on &= next.throughput != Rgb::ZERO;
     let direction = frame.to_world(wi);
     let side = if lift.dot(direction) >= 0.0 { lift } else { -lift };
-    Some(Edge { origin: offset_origin(p, side), direction, carried: next })
+    (Edge { origin: offset_origin(p, side), direction, carried: next }, goes_on)
 }
 
 #[cfg(test)]

@@ -78,7 +78,10 @@ impl Proposals<'_> {
         self.points.reserve(block);
         let (together, rest) = lanes.as_chunks::<SIDE_BY_SIDE>();
         for lanes in together {
-            let counters = lanes.map(|lane| self.counters[lane as usize]);
+            let mut counters = [self.counters[lanes[0] as usize]; SIDE_BY_SIDE];
+            for (counter, lane) in counters.iter_mut().zip(lanes) {
+                *counter = self.counters[*lane as usize];
+            }
             let words = match lanes.iter().filter(|lane| self.low_discrepancy(block, **lane)).count() {
                 0 => self.rng.words_side_by_side(counters, block),
                 SIDE_BY_SIDE => {
@@ -91,7 +94,7 @@ impl Proposals<'_> {
                 }
             };
             for (j, &lane) in lanes.iter().enumerate() {
-                self.set(block, lane as usize, words.map(|w| w[j]));
+                self.set(block, lane as usize, [words[0][j], words[1][j], words[2][j], words[3][j]]);
             }
         }
         for &lane in rest {

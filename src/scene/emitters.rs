@@ -27,8 +27,6 @@ pub struct Emitters {
 pub(crate) struct Target<'e> {
     pub mesh: &'e MeshLight,
     pub face: &'e Face,
-    /// The numbers that choose the triangle.
-    pub range: [f32; 2],
     /// That of choosing the light: exactly 1 where there is but one.
     pub probability: f32,
 }
@@ -105,9 +103,10 @@ impl Emitters {
     #[inline(always)]
     pub(crate) fn target(&self, u: f32, choice: f32) -> Option<Target<'_>> {
         let light = if self.lights.len() == 1 { 0 } else { self.choice.as_ref()?.index(choice) };
-        let Light::MeshLight(mesh) = &self.lights[light] else { unreachable!("a profile with lights on flat meshes only") };
-        let (face, range) = mesh.face(u);
-        Some(Target { mesh, face, range, probability: self.probability[light] })
+        let Light::MeshLight(mesh) = &self.lights[light] else {
+            unreachable!("a profile with lights on flat meshes only")
+        };
+        Some(Target { mesh, face: mesh.face(u), probability: self.probability[light] })
     }
 
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal

@@ -12,11 +12,7 @@ use super::{
 use crate::{
     embree::{Hit, MISS},
     math::{Frame, lift},
-    scene::{
-        Mesh,
-        description::ShapeGeometry,
-        materials::{Diffuse, Material},
-    },
+    scene::{Mesh, description::ShapeGeometry, materials::Material},
 };
 
 /// One surface of the scene, ready for look-up by the number of its Embree geometry.
@@ -230,17 +226,11 @@ impl Scene {
         }
     }
 
-    /// One side of a shape and its material, in a scene of diffuse ones.
-    ///
-    /// # Panics
-    /// If the material is another.
+    /// One side of a shape and its material, in a scene without instances whose surfaces do not vary.
     #[inline(always)]
-    pub(crate) fn diffuse_side(&self, geometry: u32, back: bool) -> (Side, &Diffuse) {
+    pub(crate) fn side(&self, geometry: u32, back: bool) -> (Side, &Material) {
         let side = self.shapes[geometry as usize].side(back);
-        match &self.materials[side.appearance as usize] {
-            Material::Diffuse(diffuse) => (side, diffuse),
-            _ => unreachable!("a profile with diffuse materials only"),
-        }
+        (side, &self.materials[side.appearance as usize])
     }
 
     #[expect(clippy::too_many_arguments, reason = "the rest of one function, kept apart because few scenes need it")]

@@ -1,16 +1,17 @@
-//! What happens at the vertices of several paths at a time, in scenes of diffuse flat meshes.
+//! What happens at the vertices of several paths at a time, in scenes of flat meshes.
 //!
 //! A group of paths goes through a few loops over its lanes. Some only fetch what lies anywhere in memory: corners,
 //! materials, triangles of lights. Between them lie those that compute, without branches and on arrays, which the
 //! compiler turns into vector instructions. They call what [`vertex`] is made of, so every lane gets the bits that
-//! it would have got alone; lanes without a path compute something that nobody looks at.
+//! it would have got alone; lanes without a path compute something that nobody looks at, and so do those on materials
+//! that are not diffuse, which then go through the vertex alone.
 
 use std::marker::PhantomData;
 
 use glam::{Vec2, Vec3};
 use pulp::NullaryFnOnce;
 
-use super::{Arrays, Connection, Edge, vertex};
+use super::{Arrays, Connection, Edge, shade_one, vertex};
 use crate::{
     math::{Frame, place_within, warp},
     path::{
@@ -21,7 +22,7 @@ use crate::{
     scene::{
         NO_LIGHT, Profile, Scene,
         lights::{LightSample, on_face, towards},
-        materials::{Diffuse, Scatter},
+        materials::{Diffuse, Material, Scatter},
         on_triangle,
     },
 };
@@ -63,6 +64,8 @@ pub(super) struct Group {
     /// Whether it was hit from behind, and whether its normal is to be turned round.
     back: [u32; N],
     flip: [u32; N],
+    /// Whether the material is diffuse.
+    diffuse: [u32; N],
     reflectance: Vectors,
     /// Primary samples: direction, place on the light, roulette.
     chosen_direction: [[f32; N]; 2],
@@ -103,6 +106,7 @@ impl Default for Group {
             ng: Vectors::ZERO,
             back: [0; N],
             flip: [0; N],
+            diffuse: [0; N],
             reflectance: Vectors::ZERO,
             chosen_direction: [[0.0; N]; 2],
             chosen_place: [[0.0; N]; 2],
@@ -138,12 +142,7 @@ pub(super) struct Shade<'a, P> {
 }
 
 impl<'a, P: Profile> Shade<'a, P> {
-    pub fn new(
-        mapping: &'a Mapping<'a>,
-        bounce: u16,
-        proposals: &'a Proposals<'a>,
-        w: &'a mut Arrays,
-    ) -> Shade<'a, P> {
+    pub fn new(mapping: &'a Mapping<'a>, bounce: u16, proposals: &'a Proposals<'a>, w: &'a mut Arrays) -> Shade<'a, P> {
         Shade { mapping, bounce, proposals, w, profile: PhantomData }
     }
 }
@@ -171,7 +170,11 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
                 look_at_lights(g);
             }
             scatter(roulette, g);
-            for (j, &lane) in lanes.iter().enumerate() {
+            for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
+                if !P::DIFFUSE && g.diffuse[j] == 0 {
+                    kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
+                    continue;
+                }
                 if lit && g.connected[j] == 1 {
                     w.connect(lane, &g.connection(j));
                 }
@@ -191,10 +194,10 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
 fn fetch_hits(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
     for (j, &slot) in slots.iter().enumerate() {
         let i = slot as usize;
-        let corners = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
-        for (to, corner) in g.corners.iter_mut().zip(corners) {
-            to.set(j, corner);
-        }
+        let [a, b, c] = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
+        g.corners[0].set(j, a);
+        g.corners[1].set(j, b);
+        g.corners[2].set(j, c);
         (g.u[j], g.v[j]) = (w.hits.u[i], w.hits.v[i]);
         g.direction.set(j, w.rays.direction(i));
         g.throughput.set(j, w.carried[i].throughput);
@@ -206,7 +209,7 @@ fn fetch_hits(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
 #[inline(always)]
 fn meet(g: &mut Group) {
     for j in 0..N {
-        let (p, ng) = on_triangle(g.corners.each_ref().map(|corner| corner.get(j)), g.u[j], g.v[j]);
+        let (p, ng) = on_triangle([g.corners[0].get(j), g.corners[1].get(j), g.corners[2].get(j)], g.u[j], g.v[j]);
         g.back[j] = u32::from(ng.dot(g.direction.get(j)) >= 0.0);
         g.p.set(j, p);
         g.ng.set(j, ng);
@@ -218,9 +221,19 @@ fn meet(g: &mut Group) {
 fn fetch_sides<P: Profile>(scene: &Scene, w: &mut Arrays, slots: &[u32], lanes: &[u32], g: &mut Group) {
     for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
         let i = slot as usize;
-        let (side, diffuse) = scene.diffuse_side(w.hits.geometry[i], g.back[j] == 1);
+        let (side, material) = scene.side(w.hits.geometry[i], g.back[j] == 1);
         g.flip[j] = u32::from(side.flip);
-        g.reflectance.set(j, diffuse.reflectance);
+        g.diffuse[j] = match material {
+            Material::Diffuse(diffuse) => {
+                g.reflectance.set(j, diffuse.reflectance);
+                1
+            }
+            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
+            _ => {
+                g.diffuse[j] = 0;
+                continue;
+            }
+        };
         if side.light != NO_LIGHT {
             let place = ([g.p.get(j), g.ng.get(j)], Vec2::ZERO);
             w.radiance[lane as usize] +=
@@ -241,11 +254,12 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
         [g.chosen_place[0][j], g.chosen_place[1][j]] = decisions.light_place;
         g.chosen_survival[j] = decisions.roulette.unwrap_or(0.0);
         let Some(target) = scene.emitters.target(decisions.light_place[0], decisions.light) else { continue };
-        for (to, from) in g.face.iter_mut().zip(target.face.corner_and_edges) {
-            to.set(j, from);
-        }
+        let [corner, e1, e2] = target.face.corner_and_edges;
+        g.face[0].set(j, corner);
+        g.face[1].set(j, e1);
+        g.face[2].set(j, e2);
         g.face_normal.set(j, target.face.normal);
-        [g.range[0][j], g.range[1][j]] = target.range;
+        [g.range[0][j], g.range[1][j]] = target.face.range;
         g.radiance.set(j, target.mesh.constant_radiance());
         g.inverse_area[j] = target.mesh.inverse_area();
         g.probability[j] = target.probability;
@@ -257,16 +271,15 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
 fn look_at_lights(g: &mut Group) {
     for j in 0..N {
         let within = place_within(g.chosen_place[0][j], [g.range[0][j], g.range[1][j]]);
-        let q = on_face(g.face.each_ref().map(|v| v.get(j)), warp::triangle([within, g.chosen_place[1][j]]));
+        let q = on_face(
+            [g.face[0].get(j), g.face[1].get(j), g.face[2].get(j)],
+            warp::triangle([within, g.chosen_place[1][j]]),
+        );
         let normal = g.face_normal.get(j);
-        let sample =
-            towards(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
+        let sample = towards(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
         let connection = sample.and_then(|sample| {
-            let light = LightSample {
-                weight: sample.weight / g.probability[j],
-                pdf: sample.pdf * g.probability[j],
-                ..sample
-            };
+            let light =
+                LightSample { weight: sample.weight / g.probability[j], pdf: sample.pdf * g.probability[j], ..sample };
             let (frame, wo) = g.seen(j);
             let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
             vertex::connected(&light, evaluation, &g.carried(j))
@@ -285,14 +298,13 @@ fn look_at_lights(g: &mut Group) {
 fn scatter(roulette: bool, g: &mut Group) {
     for j in 0..N {
         let (frame, wo) = g.seen(j);
-        let directions = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
-        let sample = Diffuse { reflectance: g.reflectance.get(j) }.sample(wo, directions, 0.0);
+        let chosen = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
+        let (sample, above) = Diffuse { reflectance: g.reflectance.get(j) }.sample_anyhow(wo, chosen);
         let u = roulette.then_some(g.chosen_survival[j]);
         let from = (g.p.get(j), g.ng.get(j), &frame);
-        let edge =
-            sample.and_then(|sample| vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex));
-        g.goes_on[j] = u32::from(edge.is_some());
-        let Edge { origin, direction, carried } = edge.unwrap_or(Edge::NONE);
+        let (edge, goes_on) = vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex);
+        g.goes_on[j] = u32::from(above & goes_on);
+        let Edge { origin, direction, carried } = edge;
         g.next_origin.set(j, origin);
         g.next_direction.set(j, direction);
         g.next_throughput.set(j, carried.throughput);

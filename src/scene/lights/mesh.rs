@@ -9,7 +9,7 @@ use super::{
     surface_pdf, towards,
 };
 use crate::{
-    math::{Cumulative, warp},
+    math::{Cumulative, place_within, warp},
     scene::{Mesh, Rgb, textures::Varying},
 };
 
@@ -32,12 +32,14 @@ pub(crate) struct Face {
     pub corner_and_edges: [Vec3; 3],
     /// Unit normal of the front.
     pub normal: Vec3,
+    /// The numbers that choose it, from the first to before the second.
+    pub range: [f32; 2],
 }
 
 impl Face {
-    fn new([a, b, c]: [Vec3; 3]) -> Face {
+    fn new([a, b, c]: [Vec3; 3], range: [f32; 2]) -> Face {
         let (e1, e2) = (b - a, c - a);
-        Face { corner_and_edges: [a, e1, e2], normal: e1.cross(e2).normalize() }
+        Face { corner_and_edges: [a, e1, e2], normal: e1.cross(e2).normalize(), range }
     }
 }
 
@@ -58,9 +60,11 @@ impl MeshLight {
     pub fn new(mesh: Arc<Mesh>, radiance: Varying) -> MeshLight {
         let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
         let total: f64 = areas.iter().sum();
+        let triangles = Cumulative::new(areas.into_iter());
+        let face = |t: usize| Face::new(mesh.corners(t as u32), triangles.range(t));
         MeshLight {
-            triangles: Cumulative::new(areas.into_iter()),
-            faces: (0..mesh.triangles.len() as u32).map(|t| Face::new(mesh.corners(t))).collect(),
+            faces: (0..mesh.triangles.len()).map(face).collect(),
+            triangles,
             inverse_area: (1.0 / total) as f32,
             mesh,
             radiance,
@@ -71,18 +75,17 @@ impl MeshLight {
     /// first number also chooses the triangle, so that near numbers give near points of one triangle.
     #[inline(always)]
     fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
-        let (triangle, within) = self.triangles.choose(u[0]);
-        let [b, c] = warp::triangle([within, u[1]]);
+        let triangle = self.triangles.index(u[0]);
         let face = &self.faces[triangle];
+        let [b, c] = warp::triangle([place_within(u[0], face.range), u[1]]);
         let normals = [face.normal, self.mesh.shading_normal(triangle as u32, b, c, face.normal)];
         (on_face(face.corner_and_edges, [b, c]), normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
     }
 
-    /// The triangle that a number chooses and the range of the numbers that choose it.
+    /// The triangle that a number chooses.
     #[inline(always)]
-    pub(crate) fn face(&self, u: f32) -> (&Face, [f32; 2]) {
-        let triangle = self.triangles.index(u);
-        (&self.faces[triangle], self.triangles.range(triangle))
+    pub(crate) fn face(&self, u: f32) -> &Face {
+        &self.faces[self.triangles.index(u)]
     }
 
     /// Its radiance, which is the same everywhere.
