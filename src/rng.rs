@@ -83,8 +83,13 @@ impl Rng {
     /// counter j is at `[i][j]`.
     #[inline(always)]
     pub fn words_side_by_side(&self, counters: [Counter; SIDE_BY_SIDE], block: u16) -> [[u32; SIDE_BY_SIDE]; 4] {
-        let words = counters.map(|counter| counter.words(block));
-        philox(std::array::from_fn(|i| words.map(|w| w[i])), self.key)
+        // loops and no closures, which the compiler would call where the loop is made for wider instructions
+        let mut words = [[0; SIDE_BY_SIDE]; 4];
+        for (j, counter) in counters.into_iter().enumerate() {
+            let [a, b, c, d] = counter.words(block);
+            (words[0][j], words[1][j], words[2][j], words[3][j]) = (a, b, c, d);
+        }
+        philox(words, self.key)
     }
 }
 

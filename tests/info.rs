@@ -44,7 +44,7 @@ fn diffuse_scenes_with_one_light_spend_no_dimension_on_choices() {
 }
 
 #[test]
-fn glass_takes_the_plain_kernel_and_a_choice_of_lobe() {
+fn glass_takes_the_flat_kernel_and_a_choice_of_lobe() {
     assert_says(
         "caustic",
         &[],
@@ -53,7 +53,7 @@ fn glass_takes_the_plain_kernel_and_a_choice_of_lobe() {
             "1 dielectric: perfect reflection and perfect refraction",
             "bounces 1 to 4: 5 (direction 2, place on light 2, lobe 1), drawn in two blocks of four",
             "left out: lens, choice of light",
-            "kernel plain, for the scene has conductor materials, dielectric materials left out: textures",
+            "kernel flat, for the scene has conductor materials, dielectric materials left out: shading normals",
         ],
     );
 }

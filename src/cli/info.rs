@@ -9,6 +9,7 @@ use super::failure::Failure;
 use super::scene::{Opened, SceneArguments};
 use crate::embree::{Device, Scene as Tracer};
 use crate::film::{Accumulator, Filter, PixelFormat};
+use crate::math;
 use crate::path::{Layout, MappingKind};
 use crate::render::trial;
 use crate::scene::description::FilmDescription;
@@ -275,20 +276,29 @@ fn runs<'a>(names: &'a [&'static str]) -> impl Iterator<Item = &'a [&'static str
     names.chunk_by(|a, b| a == b)
 }
 
+/// What the kernels for flat meshes lack.
+const BEYOND_FLAT: &str = "shading normals, spheres, disks, cylinders, instances, background, points";
+/// What the kernels for surfaces that do not vary lack.
+const BEYOND_PLAIN: &str = "textures, mixtures of materials, bent normals, tangents";
+
 fn kernel(features: &Features) -> Vec<String> {
-    match features.kernel() {
+    let mut lines = match features.kernel() {
         Kernel::Diffuse => vec![
             "diffuse: diffuse materials on flat meshes, lit by meshes".to_owned(),
-            "left out: choice of material and lobe, delta lobes, shading normals, spheres, disks, cylinders, instances, \
-             background, points"
-                .to_owned(),
+            format!("left out: choice of material and lobe, delta lobes, {BEYOND_FLAT}"),
+        ],
+        Kernel::Flat => vec![
+            format!("flat, for the scene has {}", features.beyond_diffuse().join(", ")),
+            format!("left out: {BEYOND_FLAT}, {BEYOND_PLAIN}"),
         ],
         Kernel::Plain => vec![
             format!("plain, for the scene has {}", features.beyond_diffuse().join(", ")),
-            "left out: textures, mixtures of materials, bent normals, tangents".to_owned(),
+            format!("left out: {BEYOND_PLAIN}"),
         ],
         Kernel::Full => vec![format!("full, for the scene has {}", features.beyond_plain().join(", "))],
-    }
+    };
+    lines.push(format!("loops over lanes in the instructions of this processor: {}", math::in_use()));
+    lines
 }
 
 fn embree(device: &Device, features: &Features) -> Vec<String> {

@@ -32,14 +32,17 @@ impl Cumulative {
     #[inline(always)]
     pub fn choose(&self, u: f32) -> (usize, f32) {
         let i = self.index(u);
-        let start = self.start(i);
-        (i, ((u - start) / (self.ends[i] - start)).clamp(0.0, 1.0))
+        (i, place_within(u, self.range(i)))
     }
 
     /// The number whose share holds `u`.
     #[inline(always)]
     pub fn index(&self, u: f32) -> usize {
-        self.ends.partition_point(|&end| end <= u).min(self.ends.len() - 1)
+        let below = match self.ends.len() {
+            2 => usize::from(self.ends[0] <= u) + usize::from(self.ends[1] <= u), // a lamp of two triangles
+            _ => self.ends.partition_point(|&end| end <= u),
+        };
+        below.min(self.ends.len() - 1)
     }
 
     /// The share of number `i`: exactly the probability with which [`choose`](Cumulative::choose) gives it.
@@ -49,6 +52,7 @@ impl Cumulative {
     }
 
     /// The numbers for which [`choose`](Cumulative::choose) gives number `i`: from the first to before the second.
+    #[inline(always)]
     pub fn range(&self, i: usize) -> [f32; 2] {
         [self.start(i), self.ends[i]]
     }
@@ -57,6 +61,12 @@ impl Cumulative {
     fn start(&self, i: usize) -> f32 {
         if i == 0 { 0.0 } else { self.ends[i - 1] }
     }
+}
+
+/// Where in the share from `start` to `end` the number `u` lies, within [0, 1].
+#[inline(always)]
+pub fn place_within(u: f32, [start, end]: [f32; 2]) -> f32 {
+    ((u - start) / (end - start)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

@@ -47,11 +47,10 @@ pub fn offset_origin(p: Vec3, normal: Vec3) -> Vec3 {
     const ULPS: f32 = 256.0;
     #[inline(always)]
     fn shift(p: f32, n: f32) -> f32 {
-        if p.abs() < NEAR_ZERO {
-            return p + FLOAT_SCALE * n;
-        }
+        // both ways, and one of them taken: no branch, for loops over lanes
         let ulps = (ULPS * n) as i32;
-        f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -ulps } else { ulps }) as u32)
+        let far = f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -ulps } else { ulps }) as u32);
+        if p.abs() < NEAR_ZERO { p + FLOAT_SCALE * n } else { far }
     }
     Vec3::new(shift(p.x, normal.x), shift(p.y, normal.y), shift(p.z, normal.z))
 }

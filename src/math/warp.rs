@@ -15,13 +15,12 @@ pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
 #[inline(always)]
 pub fn disk(u: [f32; 2]) -> Vec2 {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
-    if a == 0.0 && b == 0.0 {
-        return Vec2::ZERO;
-    }
     // an eighth of a turn for |minor| = |major|; negative radii reach the other half, so turns lie in [−1/8, 3/8]
-    let (r, turn) = if a.abs() > b.abs() { (a, 0.125 * (b / a)) } else { (b, 0.25 - 0.125 * (a / b)) };
-    let (s, c) = sin_cos_turn(turn);
-    Vec2::new(r * c, r * s)
+    let across = a.abs() > b.abs();
+    let (major, minor) = if across { (a, b) } else { (b, a) };
+    let part = 0.125 * (minor / major); // NaN in the middle
+    let (s, c) = sin_cos_turn(if across { part } else { 0.25 - part });
+    if major == 0.0 { Vec2::ZERO } else { Vec2::new(major * c, major * s) }
 }
 
 /// The inverse of [`disk`].

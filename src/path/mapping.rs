@@ -15,7 +15,7 @@ use super::{
 use crate::{
     rng::{Counter, Rng},
     sample::{Block, Move, Points, Proposals},
-    scene::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile, Scene},
+    scene::{DiffuseProfile, Features, FlatProfile, FullProfile, Kernel, PlainProfile, Profile, Scene},
 };
 
 /// How points of the cube become light paths.
@@ -160,6 +160,7 @@ impl<'s> Mapping<'s> {
         assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
         let (evaluate, open, walk): (Evaluate, Evaluate, Walk) = match kernel {
             Kernel::Diffuse => kernels::<DiffuseProfile>(kind),
+            Kernel::Flat => kernels::<FlatProfile>(kind),
             Kernel::Plain => kernels::<PlainProfile>(kind),
             Kernel::Full => kernels::<FullProfile>(kind),
         };

@@ -6,14 +6,17 @@
 use super::{
     Contribution, Contributions, Mapping, Workspace,
     tracing::Kind,
-    vertex::{self, Carried, Decisions, Roulette},
+    vertex::{self, Carried, Connection, Decisions, Edge, Roulette},
 };
 use crate::{
     embree::{Hits, MISS, Rays},
+    math::widest,
     rng::unit_f32,
     sample::Proposals,
     scene::{Profile, Rgb, Scene},
 };
+
+mod side_by_side;
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
 #[derive(Default)]
@@ -33,6 +36,42 @@ pub(super) struct Arrays {
     shadow_rays: Rays,
     shadow_contributions: Vec<Rgb>,
     occluded: Vec<bool>,
+    /// Vertices that are shaded side by side.
+    group: Box<side_by_side::Group>,
+}
+
+impl Arrays {
+    /// Forgets the shadow rays of the bounce before.
+    #[inline(always)]
+    fn begin_bounce(&mut self) {
+        self.shadow_lanes.clear();
+        self.shadow_rays.clear();
+        self.shadow_contributions.clear();
+    }
+
+    /// A light to look at in a lane, once all shadow rays of this bounce are there.
+    #[inline(always)]
+    fn connect(&mut self, lane: u32, connection: &Connection) {
+        self.shadow_lanes.push(lane);
+        self.shadow_rays.push(connection.origin, connection.direction, connection.tfar);
+        self.shadow_contributions.push(connection.contribution);
+    }
+
+    /// The edge with which the `place`-th path that goes on does so.
+    #[inline(always)]
+    fn go_on(&mut self, place: usize, lane: u32, edge: &Edge) {
+        self.lanes[place] = lane;
+        self.carried[place] = edge.carried;
+        self.rays.set(place, edge.origin, edge.direction, f32::MAX);
+    }
+
+    /// No more than so many paths have gone on.
+    #[inline(always)]
+    fn end_bounce(&mut self, kept: usize) {
+        self.lanes.truncate(kept);
+        self.carried.truncate(kept);
+        self.rays.truncate(kept);
+    }
 }
 
 /// One batch, from primary samples to contributions.
@@ -61,7 +100,11 @@ pub(super) fn evaluate<P: Profile>(
         if let Some(block) = mapping.layout().choices(bounce) {
             proposals.draw(block, &w.hit_lanes);
         }
-        shade::<P>(mapping, bounce, proposals, w);
+        if P::FLAT_MESHES && !P::VARYING {
+            widest(side_by_side::Shade::<P>::new(mapping, bounce, proposals, w));
+        } else {
+            shade::<P>(mapping, bounce, proposals, w);
+        }
         tracing.occluded(scene, widths, &w.shadow_rays, &mut w.occluded, out);
         connect(w);
     }
@@ -104,37 +147,42 @@ fn keep_hits<P: Profile>(scene: &Scene, w: &mut Arrays) {
 /// At every hit: emission, a light to connect to, and the next edge. The edges of the paths that go on replace the
 /// ones that led here.
 fn shade<P: Profile>(mapping: &Mapping, bounce: u16, proposals: &Proposals, w: &mut Arrays) {
-    let (scene, layout) = (mapping.scene(), mapping.layout());
-    let (first, choices) = (layout.bounce(bounce), layout.choices(bounce));
-    w.shadow_lanes.clear();
-    w.shadow_rays.clear();
-    w.shadow_contributions.clear();
+    w.begin_bounce();
     let mut kept = 0;
-    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
-        let i = slot as usize;
-        let carried = w.carried[i];
-        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
-        let hit = w.hits.get(i).expect("misses are gone");
-        let surface = scene.surface::<P>(hit, origin, direction);
-        w.radiance[lane as usize] += vertex::emission::<P>(scene, &surface, origin, &carried);
-
-        let choices = choices.map(|block| proposals.block(block, lane as usize));
-        let decisions = Decisions::new(layout, bounce, proposals.block(first, lane as usize), choices);
-        if let Some(c) = vertex::connection::<P>(scene, &surface, &carried, &decisions) {
-            w.shadow_lanes.push(lane);
-            w.shadow_rays.push(c.origin, c.direction, c.tfar);
-            w.shadow_contributions.push(c.contribution);
-        }
-        if let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) {
-            w.lanes[kept] = lane;
-            w.carried[kept] = edge.carried;
-            w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
-            kept += 1;
-        }
+    let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
+    for (&slot, &lane) in slots.iter().zip(&lanes) {
+        kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
     }
-    w.lanes.truncate(kept);
-    w.carried.truncate(kept);
-    w.rays.truncate(kept);
+    w.end_bounce(kept);
+    (w.hit_slots, w.hit_lanes) = (slots, lanes);
+}
+
+/// At one hit; returns how many paths have gone on then, `kept` before.
+#[inline(always)]
+fn shade_one<P: Profile>(
+    mapping: &Mapping,
+    bounce: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    [slot, lane]: [u32; 2],
+    kept: usize,
+) -> usize {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
+    let i = slot as usize;
+    let carried = w.carried[i];
+    let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+    let hit = w.hits.get(i).expect("misses are gone");
+    let surface = scene.surface::<P>(hit, origin, direction);
+    w.radiance[lane as usize] += vertex::emission::<P>(scene, &surface, origin, &carried);
+
+    let choices = layout.choices(bounce).map(|block| proposals.block(block, lane as usize));
+    let decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), lane as usize), choices);
+    if let Some(c) = vertex::connection::<P>(scene, &surface, &carried, &decisions) {
+        w.connect(lane, &c);
+    }
+    let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) else { return kept };
+    w.go_on(kept, lane, &edge);
+    kept + 1
 }
 
 /// Adds the lights that are seen.

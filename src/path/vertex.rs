@@ -1,15 +1,16 @@
 //! What happens at one vertex of a camera path: emission, next-event estimation, scattering, roulette. The batch
 //! and the scalar mapping are both made of these, so that they agree to the bit.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::Layout;
 use crate::{
-    math::offset_origin,
+    math::{Frame, offset_origin},
     rng::unit_f32,
     sample::Block,
     scene::{
         NO_LIGHT, Profile, Rgb, Scene, Surface,
+        lights::LightSample,
         materials::{Evaluation, ScatterSample},
     },
 };
@@ -38,6 +39,12 @@ pub(super) struct Connection {
     pub direction: Vec3,
     pub tfar: f32,
     pub contribution: Rgb,
+}
+
+impl Connection {
+    /// Stands where there is none.
+    pub const NONE: Connection =
+        Connection { origin: Vec3::ZERO, direction: Vec3::ZERO, tfar: 0.0, contribution: Rgb::ZERO };
 }
 
 /// The next edge of a path.
@@ -97,11 +104,9 @@ impl Decisions {
 /// Source: Veach 1997, section 9.2.2.
 #[inline(always)]
 fn power_heuristic(a: f32, b: f32) -> f32 {
-    if a == f32::INFINITY {
-        return 1.0;
-    }
     let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
+    let weight = 1.0 / (1.0 + ratio * ratio);
+    if a == f32::INFINITY { 1.0 } else { weight }
 }
 
 /// Radiance along an edge that left the scene.
@@ -114,14 +119,26 @@ pub(super) fn background<P: Profile>(scene: &Scene, direction: Vec3, carried: &C
 /// Radiance that the surface emits back along the edge that hit it.
 #[inline(always)]
 pub(super) fn emission<P: Profile>(scene: &Scene, surface: &Surface, origin: Vec3, carried: &Carried) -> Rgb {
-    if surface.light == NO_LIGHT {
+    emitted::<P>(scene, surface.light, ([surface.p, surface.ng], surface.uv), origin, carried)
+}
+
+/// Radiance of a light, or of none, at a place with that normal and those surface coordinates, back along the edge.
+#[inline(always)]
+pub(super) fn emitted<P: Profile>(
+    scene: &Scene,
+    light: u32,
+    ([p, ng], uv): ([Vec3; 2], Vec2),
+    origin: Vec3,
+    carried: &Carried,
+) -> Rgb {
+    if light == NO_LIGHT {
         return Rgb::ZERO;
     }
     let mut weight = 1.0;
     if carried.pdf != f32::INFINITY {
-        weight = power_heuristic(carried.pdf, scene.emitters.pdf::<P>(surface.light, origin, surface.p, surface.ng));
+        weight = power_heuristic(carried.pdf, scene.emitters.pdf::<P>(light, origin, p, ng));
     }
-    carried.throughput * scene.emitters.radiance::<P>(surface.light, surface.uv) * weight
+    carried.throughput * scene.emitters.radiance::<P>(light, uv) * weight
 }
 
 /// Next-event estimation: the light's contribution if nothing stands between.
@@ -136,7 +153,16 @@ pub(super) fn connection<P: Profile>(
         return None;
     }
     let light = scene.emitters.sample::<P>(surface.p, surface.lift, decisions.light_place, decisions.light)?;
-    let Evaluation { value, pdf } = surface.scattering.evaluate::<P>(surface.wo, surface.frame.to_local(light.wi));
+    connected(&light, surface.scattering.evaluate::<P>(surface.wo, surface.frame.to_local(light.wi)), carried)
+}
+
+/// What a light contributes that is looked at, where that much is scattered, if nothing stands between.
+#[inline(always)]
+pub(super) fn connected(
+    light: &LightSample,
+    Evaluation { value, pdf }: Evaluation,
+    carried: &Carried,
+) -> Option<Connection> {
     let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
     (contribution != Rgb::ZERO).then_some(Connection {
         origin: light.origin,
@@ -172,27 +198,38 @@ pub(super) fn scatter<P: Profile>(
     decisions: &Decisions,
     roulette: Roulette,
 ) -> Option<Edge> {
-    let ScatterSample { wi, weight, pdf, eta } =
-        surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
+    let sample = surface.scattering.sample::<P>(surface.wo, decisions.direction, decisions.lobe)?;
+    let from = (surface.p, surface.lift, &surface.frame);
+    let (edge, goes_on) = scattered(from, sample, carried, decisions.roulette, roulette);
+    goes_on.then_some(edge)
+}
+
+/// The edge in a direction that scattering has chosen, from a point with that [`lift`](Surface::lift) and frame, and
+/// whether the path goes on; `u` is the number of roulette where it is played. Without a branch, for loops over lanes.
+#[inline(always)]
+pub(super) fn scattered(
+    (p, lift, frame): (Vec3, Vec3, &Frame),
+    ScatterSample { wi, weight, pdf, eta }: ScatterSample,
+    carried: &Carried,
+    u: Option<f32>,
+    roulette: Roulette,
+) -> (Edge, bool) {
     let mut next = Carried { throughput: carried.throughput * weight, pdf, eta: carried.eta * eta, ..*carried };
-    if let Some(u) = decisions.roulette {
+    let mut goes_on = true;
+    if let Some(u) = u {
         let left = match roulette {
             Roulette::Vertex => weight * (eta * eta),
             Roulette::Path => next.throughput * (next.eta * next.eta),
         };
         let survival = left.max_element().min(MOST_SURVIVAL);
-        if u >= survival {
-            return None;
-        }
+        goes_on = u < survival;
         next.throughput /= survival;
         next.survival *= survival;
     }
-    if next.throughput == Rgb::ZERO {
-        return None;
-    }
-    let direction = surface.frame.to_world(wi);
-    let side = if surface.lift.dot(direction) >= 0.0 { surface.lift } else { -surface.lift };
-    Some(Edge { origin: offset_origin(surface.p, side), direction, carried: next })
+    goes_on &= next.throughput != Rgb::ZERO;
+    let direction = frame.to_world(wi);
+    let side = if lift.dot(direction) >= 0.0 { lift } else { -lift };
+    (Edge { origin: offset_origin(p, side), direction, carried: next }, goes_on)
 }
 
 #[cfg(test)]

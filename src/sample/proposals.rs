@@ -1,11 +1,16 @@
 //! Proposed points, drawn block by block as paths reach them.
 
+use pulp::NullaryFnOnce;
+
 use super::{
     Block, LIGHT_STREAM, Points, StepLaw,
     sobol::{self, LOW_DISCREPANCY_BLOCKS},
     strata::within_pixel,
 };
-use crate::rng::{Counter, Rng, SIDE_BY_SIDE};
+use crate::{
+    math::widest,
+    rng::{Counter, Rng, SIDE_BY_SIDE},
+};
 
 /// How a lane's proposal comes about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,12 +69,19 @@ impl Proposals<'_> {
     }
 
     /// Draws block `block` for each of `lanes`.
-    #[inline]
     pub fn draw(&mut self, block: u16, lanes: &[u32]) {
+        widest(Draw { proposals: self, block, lanes });
+    }
+
+    #[inline(always)]
+    fn draw_all(&mut self, block: u16, lanes: &[u32]) {
         self.points.reserve(block);
         let (together, rest) = lanes.as_chunks::<SIDE_BY_SIDE>();
         for lanes in together {
-            let counters = lanes.map(|lane| self.counters[lane as usize]);
+            let mut counters = [self.counters[lanes[0] as usize]; SIDE_BY_SIDE];
+            for (counter, lane) in counters.iter_mut().zip(lanes) {
+                *counter = self.counters[*lane as usize];
+            }
             let words = match lanes.iter().filter(|lane| self.low_discrepancy(block, **lane)).count() {
                 0 => self.rng.words_side_by_side(counters, block),
                 SIDE_BY_SIDE => {
@@ -82,7 +94,7 @@ impl Proposals<'_> {
                 }
             };
             for (j, &lane) in lanes.iter().enumerate() {
-                self.set(block, lane as usize, words.map(|w| w[j]));
+                self.set(block, lane as usize, [words[0][j], words[1][j], words[2][j], words[3][j]]);
             }
         }
         for &lane in rest {
@@ -91,7 +103,7 @@ impl Proposals<'_> {
     }
 
     /// Draws a block for one lane.
-    #[inline]
+    #[inline(always)]
     fn draw_one(&mut self, block: u16, lane: u32) {
         let counter = self.counters[lane as usize];
         let words = if self.low_discrepancy(block, lane) {
@@ -138,6 +150,22 @@ impl Proposals<'_> {
     #[inline(always)]
     pub fn block(&self, block: u16, lane: usize) -> Block {
         self.points.block(block, lane)
+    }
+}
+
+/// The work of [`Proposals::draw`].
+struct Draw<'d, 'p> {
+    proposals: &'d mut Proposals<'p>,
+    block: u16,
+    lanes: &'d [u32],
+}
+
+impl NullaryFnOnce for Draw<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.proposals.draw_all(self.block, self.lanes);
     }
 }
 

@@ -33,9 +33,12 @@ pub fn words(rng: Rng, counter: Counter, block: u16) -> Block {
 /// The same for [`SIDE_BY_SIDE`] points at once: word i of point j is at `[i][j]`.
 #[inline(always)]
 pub fn words_side_by_side(rng: Rng, counters: [Counter; SIDE_BY_SIDE], block: u16) -> [[u32; SIDE_BY_SIDE]; 4] {
-    let scrambles = counters.map(|counter| scramble_of(counter).0);
-    let numbers = counters.map(|counter| scramble_of(counter).1);
-    let [addends, others] = [0, 1].map(|part| rng.words_side_by_side(scrambles, 2 * block + part));
+    let (mut scrambles, mut numbers) = (counters, [0; SIDE_BY_SIDE]);
+    for (scramble, number) in scrambles.iter_mut().zip(&mut numbers) {
+        (*scramble, *number) = scramble_of(*scramble);
+    }
+    let addends = rng.words_side_by_side(scrambles, 2 * block);
+    let others = rng.words_side_by_side(scrambles, 2 * block + 1);
     scrambled(numbers, addends, others)
 }
 

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{
     Profile, Rgb, SceneDescription,
-    lights::{Ball, Emission, EmitterKind, Light, LightSample},
+    lights::{Ball, Emission, EmitterKind, Face, Light, LightSample, MeshLight},
 };
 use crate::math::Cumulative;
 
@@ -21,6 +21,14 @@ pub struct Emitters {
     surrounding: Option<u32>,
     /// All of the scene lies inside.
     ball: Ball,
+}
+
+/// A triangle of a light that was chosen to be looked at.
+pub(crate) struct Target<'e> {
+    pub mesh: &'e MeshLight,
+    pub face: &'e Face,
+    /// That of choosing the light: exactly 1 where there is but one.
+    pub probability: f32,
 }
 
 impl Emitters {
@@ -88,6 +96,17 @@ impl Emitters {
             light: light as u32,
             ..sample
         })
+    }
+
+    /// What [`sample`](Self::sample) looks at in a scene lit by flat meshes, for the first number of `u` and for `choice`;
+    /// `None` without lights.
+    #[inline(always)]
+    pub(crate) fn target(&self, u: f32, choice: f32) -> Option<Target<'_>> {
+        let light = if self.lights.len() == 1 { 0 } else { self.choice.as_ref()?.index(choice) };
+        let Light::MeshLight(mesh) = &self.lights[light] else {
+            unreachable!("a profile with lights on flat meshes only")
+        };
+        Some(Target { mesh, face: mesh.face(u), probability: self.probability[light] })
     }
 
     /// Density with which [`sample`](Self::sample) gives the direction from `origin` to the point `q` with normal

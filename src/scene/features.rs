@@ -166,6 +166,8 @@ impl Features {
     pub fn kernel(&self) -> Kernel {
         if self.beyond_diffuse().is_empty() {
             Kernel::Diffuse
+        } else if self.beyond_flat().is_empty() {
+            Kernel::Flat
         } else if self.beyond_plain().is_empty() {
             Kernel::Plain
         } else {
@@ -188,6 +190,11 @@ impl Features {
     pub fn beyond_diffuse(&self) -> Vec<String> {
         let materials =
             self.materials.keys().filter(|name| **name != "diffuse").map(|name| format!("{name} materials"));
+        materials.chain(self.beyond_flat()).collect()
+    }
+
+    /// What the scene needs and [`Kernel::Flat`] cannot do, one short phrase each.
+    pub fn beyond_flat(&self) -> Vec<String> {
         let others = [
             (self.shapes.smooth_meshes, "shading normals"),
             (self.shapes.spheres, "spheres"),
@@ -199,7 +206,7 @@ impl Features {
             (self.infinite_lights, "lights at infinity"),
         ];
         let others = others.into_iter().filter(|(n, _)| *n > 0).map(|(_, name)| name.to_owned());
-        materials.chain(others).chain(self.beyond_plain()).collect()
+        others.chain(self.beyond_plain()).collect()
     }
 }
 
@@ -208,6 +215,8 @@ impl Features {
 pub enum Kernel {
     /// Diffuse materials on flat meshes, lit by meshes.
     Diffuse,
+    /// All materials, each the same everywhere, on flat meshes, lit by meshes.
+    Flat,
     /// All materials, shapes and lights, each the same everywhere.
     Plain,
     /// Everything.
@@ -219,6 +228,7 @@ impl Kernel {
     pub fn name(self) -> &'static str {
         match self {
             Kernel::Diffuse => "diffuse",
+            Kernel::Flat => "flat",
             Kernel::Plain => "plain",
             Kernel::Full => "full",
         }
@@ -238,6 +248,9 @@ pub trait Profile {
 /// The profile of [`Kernel::Diffuse`].
 pub enum DiffuseProfile {}
 
+/// The profile of [`Kernel::Flat`].
+pub enum FlatProfile {}
+
 /// The profile of [`Kernel::Plain`].
 pub enum PlainProfile {}
 
@@ -246,6 +259,12 @@ pub enum FullProfile {}
 
 impl Profile for DiffuseProfile {
     const DIFFUSE: bool = true;
+    const FLAT_MESHES: bool = true;
+    const VARYING: bool = false;
+}
+
+impl Profile for FlatProfile {
+    const DIFFUSE: bool = false;
     const FLAT_MESHES: bool = true;
     const VARYING: bool = false;
 }

@@ -22,8 +22,9 @@ pub use appearance::{Appearance, Mixture, Scattering, ScatteringRef};
 pub use camera::{Camera, Ray, Sight};
 pub use description::SceneDescription;
 pub use emitters::Emitters;
-pub use features::{DiffuseProfile, Features, FullProfile, Kernel, PlainProfile, Profile};
+pub use features::{DiffuseProfile, Features, FlatProfile, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
+pub(crate) use surface::on_triangle;
 pub use surface::{NO_LIGHT, Surface};
 
 use crate::embree;

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     embree::{Hit, MISS},
     math::{Frame, lift},
-    scene::{Mesh, description::ShapeGeometry},
+    scene::{Mesh, description::ShapeGeometry, materials::Material},
 };
 
 /// One surface of the scene, ready for look-up by the number of its Embree geometry.
@@ -31,6 +31,29 @@ pub(crate) struct Shape {
 
 /// Marks a surface that does not emit.
 pub const NO_LIGHT: u32 = u32::MAX;
+
+/// What a shape is, seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Side {
+    /// Normals are turned round.
+    pub flip: bool,
+    /// Number of the appearance.
+    pub appearance: u32,
+    /// As in [`Surface`].
+    pub light: u32,
+}
+
+impl Shape {
+    /// Seen from the back or from the front.
+    #[inline(always)]
+    fn side(&self, back: bool) -> Side {
+        Side {
+            flip: back && self.two_sided,
+            appearance: self.appearances[usize::from(back)],
+            light: if back { NO_LIGHT } else { self.light },
+        }
+    }
+}
 
 #[derive(Clone, Debug)]
 pub(super) enum Kind {
@@ -171,9 +194,8 @@ impl Scene {
         // as in Mitsuba the shading normal decides the side, of scattering as of emission
         let ns = point.ns;
         let back = ns.dot(direction) >= 0.0;
-        let flip = back && shape.two_sided;
-        let index = shape.appearances[usize::from(back)] as usize;
-        let light = if back { NO_LIGHT } else { shape.light };
+        let Side { flip, appearance, light } = shape.side(back);
+        let index = appearance as usize;
         if P::VARYING && shape.varies {
             return self.varying_surface(shape, hit, direction, &point, flip, index, light);
         }
@@ -192,6 +214,25 @@ impl Scene {
     }
 
     /// A surface that depends on the place on it.
+    /// The corners of a triangle, in a scene of flat meshes.
+    ///
+    /// # Panics
+    /// If the shape is another.
+    #[inline(always)]
+    pub(crate) fn flat_corners(&self, geometry: u32, triangle: u32) -> [Vec3; 3] {
+        match &self.shapes[geometry as usize].kind {
+            Kind::Flat(mesh) => mesh.corners(triangle),
+            _ => unreachable!("a profile with flat meshes only"),
+        }
+    }
+
+    /// One side of a shape and its material, in a scene without instances whose surfaces do not vary.
+    #[inline(always)]
+    pub(crate) fn side(&self, geometry: u32, back: bool) -> (Side, &Material) {
+        let side = self.shapes[geometry as usize].side(back);
+        (side, &self.materials[side.appearance as usize])
+    }
+
     #[expect(clippy::too_many_arguments, reason = "the rest of one function, kept apart because few scenes need it")]
     fn varying_surface(
         &self,
@@ -245,7 +286,12 @@ impl Scene {
 /// Position (from barycentric coordinates, which is more exact than along the ray) and unit normal.
 #[inline(always)]
 fn flat(mesh: &Mesh, hit: Hit) -> (Vec3, Vec3) {
-    let [a, b, c] = mesh.corners(hit.primitive);
+    on_triangle(mesh.corners(hit.primitive), hit.u, hit.v)
+}
+
+/// A point of a triangle with those corners by its barycentric coordinates (1 − u − v, u, v), and the unit normal.
+#[inline(always)]
+pub(crate) fn on_triangle([a, b, c]: [Vec3; 3], u: f32, v: f32) -> (Vec3, Vec3) {
     let (e1, e2) = (b - a, c - a);
-    (a + e1 * hit.u + e2 * hit.v, e1.cross(e2).normalize())
+    (a + e1 * u + e2 * v, e1.cross(e2).normalize())
 }

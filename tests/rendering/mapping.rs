@@ -8,7 +8,7 @@ use relt::path::{
 };
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
-use relt::scene::{DiffuseProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
+use relt::scene::{DiffuseProfile, FlatProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
 
 use crate::support::{OWN, fixed_widths, load, own, repository};
 
@@ -170,7 +170,10 @@ fn every_lane_of_a_batch_is_what_the_scalar_mapping_says() {
         let scene = own(name, &[("res", "64")]);
         let full = every_width::<FullProfile>(name, &scene, Kernel::Full);
         let plain = every_width::<PlainProfile>(name, &scene, Kernel::Plain);
-        assert!(full.iter().zip(&plain).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
+        let flat = every_width::<FlatProfile>(name, &scene, Kernel::Flat);
+        for other in [&plain, &flat] {
+            assert!(full.iter().zip(other).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
+        }
         if scene.features.kernel() == Kernel::Diffuse {
             let diffuse = every_width::<DiffuseProfile>(name, &scene, Kernel::Diffuse);
             assert!(full.iter().zip(&diffuse).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
@@ -203,7 +206,7 @@ fn batch_and_scalar_agree_where_a_scene_has_everything() {
 #[test]
 fn the_small_kernel_is_chosen_where_it_is_enough() {
     let kernels = OWN.map(|name| own(name, &[]).features.kernel());
-    assert_eq!(kernels, [Kernel::Diffuse, Kernel::Plain, Kernel::Diffuse], "{OWN:?}");
+    assert_eq!(kernels, [Kernel::Diffuse, Kernel::Flat, Kernel::Diffuse], "{OWN:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::{
     surface_pdf, towards,
 };
 use crate::{
-    math::{Cumulative, warp},
+    math::{Cumulative, place_within, warp},
     scene::{Mesh, Rgb, textures::Varying},
 };
 
@@ -19,8 +19,34 @@ pub struct MeshLight {
     mesh: Arc<Mesh>,
     /// In proportion to area.
     triangles: Cumulative,
+    /// Where they lie, triangle by triangle.
+    faces: Vec<Face>,
     inverse_area: f32,
     radiance: Varying,
+}
+
+/// A triangle as [`MeshLight::place`] needs it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Face {
+    /// The first corner, and what leads from there to the second and the third.
+    pub corner_and_edges: [Vec3; 3],
+    /// Unit normal of the front.
+    pub normal: Vec3,
+    /// The numbers that choose it, from the first to before the second.
+    pub range: [f32; 2],
+}
+
+impl Face {
+    fn new([a, b, c]: [Vec3; 3], range: [f32; 2]) -> Face {
+        let (e1, e2) = (b - a, c - a);
+        Face { corner_and_edges: [a, e1, e2], normal: e1.cross(e2).normalize(), range }
+    }
+}
+
+/// The point of a triangle, given by a corner and two edges, with barycentric coordinates (1 − b − c, b, c).
+#[inline(always)]
+pub(crate) fn on_face([corner, e1, e2]: [Vec3; 3], [b, c]: [f32; 2]) -> Vec3 {
+    corner + e1 * b + e2 * c
 }
 
 impl PartialEq for MeshLight {
@@ -34,20 +60,47 @@ impl MeshLight {
     pub fn new(mesh: Arc<Mesh>, radiance: Varying) -> MeshLight {
         let areas: Vec<f64> = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).collect();
         let total: f64 = areas.iter().sum();
-        MeshLight { mesh, triangles: Cumulative::new(areas.into_iter()), inverse_area: (1.0 / total) as f32, radiance }
+        let triangles = Cumulative::new(areas.into_iter());
+        let face = |t: usize| Face::new(mesh.corners(t as u32), triangles.range(t));
+        MeshLight {
+            faces: (0..mesh.triangles.len()).map(face).collect(),
+            triangles,
+            inverse_area: (1.0 / total) as f32,
+            mesh,
+            radiance,
+        }
     }
 
     /// A place, uniform over the area, with the geometric and the shading normal of the front there and the radiance. The
     /// first number also chooses the triangle, so that near numbers give near points of one triangle.
     #[inline(always)]
     fn place(&self, u: [f32; 2]) -> (Vec3, [Vec3; 2], Rgb) {
-        let (triangle, within) = self.triangles.choose(u[0]);
-        let [b, c] = warp::triangle([within, u[1]]);
-        let [p0, p1, p2] = self.mesh.corners(triangle as u32);
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let n = e1.cross(e2).normalize();
-        let normals = [n, self.mesh.shading_normal(triangle as u32, b, c, n)];
-        (p0 + e1 * b + e2 * c, normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
+        let triangle = self.triangles.index(u[0]);
+        let face = &self.faces[triangle];
+        let [b, c] = warp::triangle([place_within(u[0], face.range), u[1]]);
+        let normals = [face.normal, self.mesh.shading_normal(triangle as u32, b, c, face.normal)];
+        (on_face(face.corner_and_edges, [b, c]), normals, self.radiance.at(|| self.mesh.uv(triangle as u32, b, c)))
+    }
+
+    /// The triangle that a number chooses.
+    #[inline(always)]
+    pub(crate) fn face(&self, u: f32) -> &Face {
+        &self.faces[self.triangles.index(u)]
+    }
+
+    /// Its radiance, which is the same everywhere.
+    ///
+    /// # Panics
+    /// If it is textured.
+    #[inline(always)]
+    pub(crate) fn constant_radiance(&self) -> Rgb {
+        self.radiance.at(|| unreachable!("a profile without textures"))
+    }
+
+    /// 1 / area.
+    #[inline(always)]
+    pub(crate) fn inverse_area(&self) -> f32 {
+        self.inverse_area
     }
 
     /// The inverse of [`place`](Self::place).

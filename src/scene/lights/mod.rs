@@ -25,6 +25,7 @@ pub use disk::Disk;
 pub use emission::{Ball, Emission, EmissionInverse, EmitterKind};
 pub use envmap::Envmap;
 pub use mesh::MeshLight;
+pub(crate) use mesh::{Face, on_face};
 pub use point::Point;
 pub use sphere::Sphere;
 pub use spot::Spot;
@@ -318,7 +319,7 @@ impl Light {
 /// A sample towards the point `q` of a surface that emits `radiance`, chosen with density `pdf_area`. Of the surface's
 /// normals the shading one tells the side that shines, as for rays that hit it, and the geometric one the density.
 #[inline(always)]
-fn towards(
+pub(crate) fn towards(
     p: Vec3,
     ng: Vec3,
     q: Vec3,
@@ -332,11 +333,8 @@ fn towards(
     let distance = d2.sqrt();
     let wi = to / distance;
     let cos = wi.dot(geometric).abs();
-    if wi.dot(shading) >= 0.0 || cos == 0.0 || d2 <= 0.0 {
-        return None; // from behind
-    }
     let pdf = pdf_area * d2 / cos;
-    Some(LightSample {
+    let sample = LightSample {
         origin,
         wi,
         tfar: distance * SHORT_OF_LIGHT,
@@ -344,7 +342,9 @@ fn towards(
         pdf,
         normals: [geometric, shading],
         light: 0,
-    })
+    };
+    let from_behind = (wi.dot(shading) >= 0.0) | (cos == 0.0) | (d2 <= 0.0);
+    (!from_behind).then_some(sample)
 }
 
 /// A density per area as one per solid angle at `origin`: times distance² over the cosine at the light.

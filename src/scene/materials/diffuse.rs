@@ -15,6 +15,16 @@ pub struct Diffuse {
     pub reflectance: Rgb,
 }
 
+impl Diffuse {
+    /// What [`sample`](Scatter::sample) gives, and whether it gives it: without a branch, for loops over lanes.
+    #[inline(always)]
+    pub(crate) fn sample_anyhow(&self, wo: Vec3, u: [f32; 2]) -> (ScatterSample, bool) {
+        let wi = warp::cosine_hemisphere(u);
+        let sample = ScatterSample { wi, weight: self.reflectance, pdf: warp::cosine_hemisphere_pdf(wi.z), eta: 1.0 };
+        (sample, (wo.z > 0.0) & (wi.z > 0.0))
+    }
+}
+
 impl Scatter for Diffuse {
     const VARYING: &'static [VaryingParameter] = &[VaryingParameter::reflectance("reflectance")];
 
@@ -29,13 +39,8 @@ impl Scatter for Diffuse {
 
     #[inline(always)]
     fn sample(&self, wo: Vec3, u: [f32; 2], _choice: f32) -> Option<ScatterSample> {
-        let wi = warp::cosine_hemisphere(u);
-        (wo.z > 0.0 && wi.z > 0.0).then(|| ScatterSample {
-            wi,
-            weight: self.reflectance,
-            pdf: warp::cosine_hemisphere_pdf(wi.z),
-            eta: 1.0,
-        })
+        let (sample, above) = self.sample_anyhow(wo, u);
+        above.then_some(sample)
     }
 
     fn invert(&self, wo: Vec3, wi: Vec3) -> Option<Inverse> {

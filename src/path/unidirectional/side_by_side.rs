@@ -1,0 +1,352 @@
+//! What happens at the vertices of several paths at a time, in scenes of flat meshes.
+//!
+//! A group of paths goes through a few loops over its lanes. Some only fetch what lies anywhere in memory: corners,
+//! materials, triangles of lights. Between them lie those that compute, without branches and on arrays, which the
+//! compiler turns into vector instructions. They call what [`vertex`] is made of, so every lane gets the bits that
+//! it would have got alone; lanes without a path compute something that nobody looks at, and so do those on materials
+//! that are not diffuse, which then go through the vertex alone.
+
+use std::marker::PhantomData;
+
+use glam::{Vec2, Vec3};
+use pulp::NullaryFnOnce;
+
+use super::{Arrays, Connection, Edge, shade_one, vertex};
+use crate::{
+    math::{Frame, place_within, warp},
+    path::{
+        Mapping,
+        vertex::{Carried, Decisions, Roulette},
+    },
+    sample::Proposals,
+    scene::{
+        NO_LIGHT, Profile, Scene,
+        lights::{LightSample, on_face, towards},
+        materials::{Diffuse, Material, Scatter},
+        on_triangle,
+    },
+};
+
+/// Paths in a group: two vectors of AVX2.
+const N: usize = 16;
+
+/// Vectors in step.
+#[derive(Clone, Copy)]
+struct Vectors([[f32; N]; 3]);
+
+impl Vectors {
+    const ZERO: Vectors = Vectors([[0.0; N]; 3]);
+
+    #[inline(always)]
+    fn get(&self, j: usize) -> Vec3 {
+        Vec3::new(self.0[0][j], self.0[1][j], self.0[2][j])
+    }
+
+    #[inline(always)]
+    fn set(&mut self, j: usize, v: Vec3) {
+        [self.0[0][j], self.0[1][j], self.0[2][j]] = v.to_array();
+    }
+}
+
+/// Vertices of a group of paths, as a structure of arrays; truths are 0 or 1.
+pub(super) struct Group {
+    /// The edges that led there.
+    direction: Vectors,
+    throughput: Vectors,
+    survival: [f32; N],
+    /// What was hit: corners and barycentric coordinates.
+    corners: [Vectors; 3],
+    u: [f32; N],
+    v: [f32; N],
+    /// Position and unit normal of the front.
+    p: Vectors,
+    ng: Vectors,
+    /// Whether it was hit from behind, and whether its normal is to be turned round.
+    back: [u32; N],
+    flip: [u32; N],
+    /// Whether the material is diffuse.
+    diffuse: [u32; N],
+    reflectance: Vectors,
+    /// Primary samples: direction, place on the light, roulette.
+    chosen_direction: [[f32; N]; 2],
+    chosen_place: [[f32; N]; 2],
+    chosen_survival: [f32; N],
+    /// The chosen triangles of lights: corner and edges, unit normal, and the range of the numbers that choose it.
+    face: [Vectors; 3],
+    face_normal: Vectors,
+    range: [[f32; N]; 2],
+    radiance: Vectors,
+    inverse_area: [f32; N],
+    probability: [f32; N],
+    /// Connections to lights, and whether there are any.
+    connected: [u32; N],
+    shadow_origin: Vectors,
+    shadow_direction: Vectors,
+    shadow_end: [f32; N],
+    contribution: Vectors,
+    /// Next edges, and whether there are any.
+    goes_on: [u32; N],
+    next_origin: Vectors,
+    next_direction: Vectors,
+    next_throughput: Vectors,
+    next_pdf: [f32; N],
+    next_survival: [f32; N],
+}
+
+impl Default for Group {
+    fn default() -> Group {
+        Group {
+            direction: Vectors::ZERO,
+            throughput: Vectors::ZERO,
+            survival: [0.0; N],
+            corners: [Vectors::ZERO; 3],
+            u: [0.0; N],
+            v: [0.0; N],
+            p: Vectors::ZERO,
+            ng: Vectors::ZERO,
+            back: [0; N],
+            flip: [0; N],
+            diffuse: [0; N],
+            reflectance: Vectors::ZERO,
+            chosen_direction: [[0.0; N]; 2],
+            chosen_place: [[0.0; N]; 2],
+            chosen_survival: [0.0; N],
+            face: [Vectors::ZERO; 3],
+            face_normal: Vectors::ZERO,
+            range: [[0.0; N]; 2],
+            radiance: Vectors::ZERO,
+            inverse_area: [0.0; N],
+            probability: [0.0; N],
+            connected: [0; N],
+            shadow_origin: Vectors::ZERO,
+            shadow_direction: Vectors::ZERO,
+            shadow_end: [0.0; N],
+            contribution: Vectors::ZERO,
+            goes_on: [0; N],
+            next_origin: Vectors::ZERO,
+            next_direction: Vectors::ZERO,
+            next_throughput: Vectors::ZERO,
+            next_pdf: [0.0; N],
+            next_survival: [0.0; N],
+        }
+    }
+}
+
+/// The work of a bounce: at every hit emission, a light to connect to, and the next edge, as `shade` does them.
+pub(super) struct Shade<'a, P> {
+    mapping: &'a Mapping<'a>,
+    bounce: u16,
+    proposals: &'a Proposals<'a>,
+    w: &'a mut Arrays,
+    profile: PhantomData<P>,
+}
+
+impl<'a, P: Profile> Shade<'a, P> {
+    pub fn new(mapping: &'a Mapping<'a>, bounce: u16, proposals: &'a Proposals<'a>, w: &'a mut Arrays) -> Shade<'a, P> {
+        Shade { mapping, bounce, proposals, w, profile: PhantomData }
+    }
+}
+
+impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Shade { mapping, bounce, proposals, w, .. } = self;
+        let (scene, lit) = (mapping.scene(), mapping.scene().features.lights() > 0);
+        let roulette = mapping.layout().roulette(bounce);
+        // the group and the lists are lent out while the other arrays are written to
+        let mut group = std::mem::take(&mut w.group);
+        let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes));
+        w.begin_bounce();
+        let mut kept = 0;
+        for (slots, lanes) in slots.chunks(N).zip(lanes.chunks(N)) {
+            let g = &mut *group;
+            fetch_hits(scene, w, slots, g);
+            meet(g);
+            fetch_sides::<P>(scene, w, slots, lanes, g);
+            fetch_choices(mapping, bounce, proposals, lanes, g);
+            if lit {
+                look_at_lights(g);
+            }
+            scatter(roulette, g);
+            for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
+                if !P::DIFFUSE && g.diffuse[j] == 0 {
+                    kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
+                    continue;
+                }
+                if lit && g.connected[j] == 1 {
+                    w.connect(lane, &g.connection(j));
+                }
+                if g.goes_on[j] == 1 {
+                    w.go_on(kept, lane, &g.edge(j));
+                    kept += 1;
+                }
+            }
+        }
+        w.end_bounce(kept);
+        (w.group, w.hit_slots, w.hit_lanes) = (group, slots, lanes);
+    }
+}
+
+/// Fetches what was hit.
+#[inline(always)]
+fn fetch_hits(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
+    for (j, &slot) in slots.iter().enumerate() {
+        let i = slot as usize;
+        let [a, b, c] = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
+        g.corners[0].set(j, a);
+        g.corners[1].set(j, b);
+        g.corners[2].set(j, c);
+        (g.u[j], g.v[j]) = (w.hits.u[i], w.hits.v[i]);
+        g.direction.set(j, w.rays.direction(i));
+        g.throughput.set(j, w.carried[i].throughput);
+        g.survival[j] = w.carried[i].survival;
+    }
+}
+
+/// Finds where that is and which way it faces.
+#[inline(always)]
+fn meet(g: &mut Group) {
+    for j in 0..N {
+        let (p, ng) = on_triangle([g.corners[0].get(j), g.corners[1].get(j), g.corners[2].get(j)], g.u[j], g.v[j]);
+        g.back[j] = u32::from(ng.dot(g.direction.get(j)) >= 0.0);
+        g.p.set(j, p);
+        g.ng.set(j, ng);
+    }
+}
+
+/// Fetches the materials, and adds what the surfaces emit.
+#[inline(always)]
+fn fetch_sides<P: Profile>(scene: &Scene, w: &mut Arrays, slots: &[u32], lanes: &[u32], g: &mut Group) {
+    for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
+        let i = slot as usize;
+        let (side, material) = scene.side(w.hits.geometry[i], g.back[j] == 1);
+        g.flip[j] = u32::from(side.flip);
+        g.diffuse[j] = match material {
+            Material::Diffuse(diffuse) => {
+                g.reflectance.set(j, diffuse.reflectance);
+                1
+            }
+            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
+            _ => {
+                g.diffuse[j] = 0;
+                continue;
+            }
+        };
+        if side.light != NO_LIGHT {
+            let place = ([g.p.get(j), g.ng.get(j)], Vec2::ZERO);
+            w.radiance[lane as usize] +=
+                vertex::emitted::<P>(scene, side.light, place, w.rays.origin(i), &w.carried[i]);
+        }
+    }
+}
+
+/// Fetches the primary samples and the triangles of lights that they choose.
+#[inline(always)]
+fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &[u32], g: &mut Group) {
+    let (scene, layout) = (mapping.scene(), mapping.layout());
+    let (first, choices) = (layout.bounce(bounce), layout.choices(bounce));
+    for (j, &lane) in lanes.iter().enumerate() {
+        let choices = choices.map(|block| proposals.block(block, lane as usize));
+        let decisions = Decisions::new(layout, bounce, proposals.block(first, lane as usize), choices);
+        [g.chosen_direction[0][j], g.chosen_direction[1][j]] = decisions.direction;
+        [g.chosen_place[0][j], g.chosen_place[1][j]] = decisions.light_place;
+        g.chosen_survival[j] = decisions.roulette.unwrap_or(0.0);
+        let Some(target) = scene.emitters.target(decisions.light_place[0], decisions.light) else { continue };
+        let [corner, e1, e2] = target.face.corner_and_edges;
+        g.face[0].set(j, corner);
+        g.face[1].set(j, e1);
+        g.face[2].set(j, e2);
+        g.face_normal.set(j, target.face.normal);
+        [g.range[0][j], g.range[1][j]] = target.face.range;
+        g.radiance.set(j, target.mesh.constant_radiance());
+        g.inverse_area[j] = target.mesh.inverse_area();
+        g.probability[j] = target.probability;
+    }
+}
+
+/// Next-event estimation: the lights' contributions if nothing stands between.
+#[inline(always)]
+fn look_at_lights(g: &mut Group) {
+    for j in 0..N {
+        let within = place_within(g.chosen_place[0][j], [g.range[0][j], g.range[1][j]]);
+        let q = on_face(
+            [g.face[0].get(j), g.face[1].get(j), g.face[2].get(j)],
+            warp::triangle([within, g.chosen_place[1][j]]),
+        );
+        let normal = g.face_normal.get(j);
+        let sample = towards(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
+        let connection = sample.and_then(|sample| {
+            let light =
+                LightSample { weight: sample.weight / g.probability[j], pdf: sample.pdf * g.probability[j], ..sample };
+            let (frame, wo) = g.seen(j);
+            let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
+            vertex::connected(&light, evaluation, &g.carried(j))
+        });
+        g.connected[j] = u32::from(connection.is_some());
+        let Connection { origin, direction, tfar, contribution } = connection.unwrap_or(Connection::NONE);
+        g.shadow_origin.set(j, origin);
+        g.shadow_direction.set(j, direction);
+        g.shadow_end[j] = tfar;
+        g.contribution.set(j, contribution);
+    }
+}
+
+/// Scattering and, where it is played, roulette.
+#[inline(always)]
+fn scatter(roulette: bool, g: &mut Group) {
+    for j in 0..N {
+        let (frame, wo) = g.seen(j);
+        let chosen = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
+        let (sample, above) = Diffuse { reflectance: g.reflectance.get(j) }.sample_anyhow(wo, chosen);
+        let u = roulette.then_some(g.chosen_survival[j]);
+        let from = (g.p.get(j), g.ng.get(j), &frame);
+        let (edge, goes_on) = vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex);
+        g.goes_on[j] = u32::from(above & goes_on);
+        let Edge { origin, direction, carried } = edge;
+        g.next_origin.set(j, origin);
+        g.next_direction.set(j, direction);
+        g.next_throughput.set(j, carried.throughput);
+        g.next_pdf[j] = carried.pdf;
+        g.next_survival[j] = carried.survival;
+    }
+}
+
+impl Group {
+    /// The frame on the side that is seen, and from where.
+    #[inline(always)]
+    fn seen(&self, j: usize) -> (Frame, Vec3) {
+        let ng = self.ng.get(j);
+        let frame = Frame::new(if self.flip[j] == 1 { -ng } else { ng });
+        (frame, frame.to_local(-self.direction.get(j)))
+    }
+
+    /// What a path carried along the edge that led to its vertex, but for the density, which only emission needs.
+    #[inline(always)]
+    fn carried(&self, j: usize) -> Carried {
+        Carried { throughput: self.throughput.get(j), survival: self.survival[j], ..Carried::START }
+    }
+
+    #[inline(always)]
+    fn connection(&self, j: usize) -> Connection {
+        Connection {
+            origin: self.shadow_origin.get(j),
+            direction: self.shadow_direction.get(j),
+            tfar: self.shadow_end[j],
+            contribution: self.contribution.get(j),
+        }
+    }
+
+    /// Diffuse surfaces refract nothing, so the product of ratios of refractive indices stays 1.
+    #[inline(always)]
+    fn edge(&self, j: usize) -> Edge {
+        let carried = Carried {
+            throughput: self.next_throughput.get(j),
+            pdf: self.next_pdf[j],
+            survival: self.next_survival[j],
+            ..Carried::START
+        };
+        Edge { origin: self.next_origin.get(j), direction: self.next_direction.get(j), carried }
+    }
+}
