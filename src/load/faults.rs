@@ -105,7 +105,7 @@ impl LoadError {
         };
         let mut faults: Vec<_> = found.into_iter().take(MOST_FAULTS).map(fault).collect();
         if is_full {
-            let message = format!("has more faults than these {MOST_FAULTS}, maybe");
+            let message = format!("has at least these {MOST_FAULTS} faults; there may be more");
             faults.push(Fault { message, position: None, span: None });
         }
         LoadError::new(path, text, faults)
@@ -192,9 +192,12 @@ pub(crate) fn list(known: &[&str]) -> String {
         return "none is known here".into();
     }
     let mut known = known.to_vec();
-    known.sort_unstable();
     let more = known.len().saturating_sub(MOST_NAMES);
-    known.truncate(MOST_NAMES);
+    if more > 0 {
+        known.select_nth_unstable(MOST_NAMES); // the first are all that need be in order
+        known.truncate(MOST_NAMES);
+    }
+    known.sort_unstable();
     let names: Vec<_> = known.into_iter().map(shortened).collect();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!("known: {}{more}", names.join(", "))
@@ -213,13 +216,15 @@ pub(crate) fn did_you_mean(name: &str, known: &[&str]) -> String {
     let length = name.chars().take(MOST_LETTERS).count();
     // as many letters as lengths differ by are wrong at least, and a third of them is no slip of the finger any more
     let may_be_near = |k: &&&str| 3 * k.chars().take(MOST_LETTERS).count().abs_diff(length) <= k.len();
-    let near = known.iter().filter(may_be_near).map(|k| (edits(name, k), k)).min();
+    let near = known.iter().filter(may_be_near).take(MOST_COMPARED).map(|k| (edits(name, k), k)).min();
     match near {
         Some((edits, near)) if edits > 0 && 3 * edits <= near.len() => format!(" (did you mean {near:?}?)"),
         _ => String::new(),
     }
 }
 
+/// Names of about the same length that are compared.
+const MOST_COMPARED: usize = 1000;
 /// Letters of a name that are looked at.
 const MOST_LETTERS: usize = 64;
 

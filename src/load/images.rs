@@ -71,8 +71,10 @@ fn decode_other(bytes: &[u8]) -> Result<Image, String> {
         return Err("is no picture that relt reads; known: PNG, JPEG, HDR, OpenEXR".into());
     }
     let (width, height) = sized.into_dimensions().map_err(|error| format!("cannot be decoded: {error}"))?;
-    let bytes = BYTES_OF_TEXEL * u64::from(width) * u64::from(height);
-    memory::check(bytes, format_args!("{width} × {height} texels"))?;
+    if width.max(height) <= MOST_TEXELS_ACROSS {
+        let bytes = BYTES_OF_TEXEL * u64::from(width) * u64::from(height);
+        memory::check(bytes, format_args!("{width} × {height} texels"))?;
+    }
     let mut limits = Limits::default();
     limits.max_image_width = Some(MOST_TEXELS_ACROSS);
     limits.max_image_height = Some(MOST_TEXELS_ACROSS);

@@ -119,7 +119,7 @@ pub fn read(path: &Path, text: &str, source: usize, defines: &[(String, String)]
         aliases: HashMap::new(),
         files: vec![path.to_owned()],
     };
-    let scene = reader.file(text, source)?;
+    let scene = reader.file(text, source, 0)?;
     reader.names.unused().into_iter().for_each(|message| notes.fault(&scene.place, message));
     Some(Document { scene, aliases: reader.aliases })
 }
@@ -133,8 +133,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// The root of a file.
-    fn file(&mut self, text: &str, source: usize) -> Option<Node> {
+    /// The root of a file that is so deep inside of others.
+    fn file(&mut self, text: &str, source: usize, depth: usize) -> Option<Node> {
         // entities could name other files or grow without bounds; roxmltree refuses the latter and knows no former
         let document = match roxmltree::Document::parse(text) {
             Ok(document) => document,
@@ -150,7 +150,7 @@ impl Reader<'_> {
             self.notes.fault(&Place::new(source, root.range().start..root.range().start + 1), message);
             return None;
         }
-        self.node(root, source, 0)
+        self.node(root, source, depth)
     }
 
     fn node(&mut self, node: roxmltree::Node, source: usize, depth: usize) -> Option<Node> {
@@ -180,7 +180,7 @@ impl Reader<'_> {
                 "alias" => {
                     self.aliases.insert(child.value("as").to_owned(), child.value("id").to_owned());
                 }
-                "include" => read.children.extend(self.included(&child)),
+                "include" => read.children.extend(self.included(&child, depth)),
                 _ => read.children.push(child),
             }
         }
@@ -188,7 +188,7 @@ impl Reader<'_> {
     }
 
     /// What the root of another file holds.
-    fn included(&mut self, include: &Node) -> Vec<Node> {
+    fn included(&mut self, include: &Node, depth: usize) -> Vec<Node> {
         let place = include.place_of("filename").clone();
         let Some(name) = include.attribute("filename") else {
             self.notes.fault(&include.place, "<include> needs the attribute filename");
@@ -213,7 +213,7 @@ impl Reader<'_> {
             }
         };
         self.files.push(path);
-        let root = self.file(&text, source);
+        let root = self.file(&text, source, depth);
         self.files.pop();
         root.map_or(Vec::new(), |root| root.children)
     }
