@@ -35,6 +35,7 @@ pub mod embree;
 pub mod film;
 pub mod load;
 pub mod math;
+pub(crate) mod memory;
 pub mod path;
 pub mod render;
 pub mod rng;

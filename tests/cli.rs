@@ -175,3 +175,46 @@ fn help_tells_exit_codes_defaults_and_units() {
     assert_eq!(relt(folder.path(), &[]).status.code(), Some(2));
     assert_eq!(relt(folder.path(), &["paint"]).status.code(), Some(2));
 }
+
+#[test]
+fn a_confined_scene_reads_nothing_from_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    std::fs::create_dir(folder.path().join("scene")).unwrap();
+    write("out.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let shape = "<shape type='obj'><string name='filename' value='../out.obj'/></shape>";
+    let film = "<film type='hdrfilm'><integer name='width' value='4'/><integer name='height' value='4'/></film>";
+    let around = "<sensor type='perspective'>".to_owned() + film + "</sensor><emitter type='constant'/>";
+    write("scene/scene.xml", &format!("<scene version='3.0.0'>{shape}{around}</scene>"));
+    write("scene/old.xml", &format!("<scene version='2.0.0'>{shape}{around}</scene>"));
+    let method = "[[method]]\nmethod = 'path'\n";
+    write("study.toml", &format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'scene/scene.xml'\n{method}"));
+    let run = |arguments: &[&str]| {
+        let output = relt(folder.path(), arguments);
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let commands: [&[&str]; 6] = [
+        &["render", "scene/scene.xml", "-o", "a.exr"],
+        &["info", "scene/scene.xml"],
+        &["reference", "scene/scene.xml", "--target-relmse", "1"],
+        &["replay", "scene/scene.xml", "--method", "path", "--mpp", "1", "--pixel", "0,0", "--sample", "0"],
+        &["study", "study.toml", "--dry-run"],
+        &["convert", "scene/old.xml", "scene/new.xml"],
+    ];
+    for command in commands {
+        let (code, text) = run(&[command, &["--confine"]].concat());
+        assert_eq!(code, Some(2), "{command:?}:\n{text}");
+        let words: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for part in ["../out.obj is not read", "outside of the scene's folder", "--confine forbids"] {
+            assert!(words.contains(part), "{command:?}: {part:?} is not in:\n{text}");
+        }
+    }
+    for command in [commands[1], commands[5]] {
+        let (code, text) = run(command);
+        assert_eq!(code, Some(0), "without --confine:\n{text}");
+    }
+    // no key of a study: it would have no effect there
+    write("study.toml", &format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'scene/scene.xml'\n{method}confine = true\n"));
+    let (code, text) = run(&["study", "study.toml", "--dry-run"]);
+    assert!(code == Some(2) && text.contains("`confine` is no option of a method"), "{text}");
+}

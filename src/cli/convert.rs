@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::values;
+use crate::load::Reach;
 use crate::convert::{ConvertError, Job, Kind, Note, convert};
 
 /// Converts a scene of Mitsuba 0.5, 0.6 or 2 (.xml) or of pbrt-v4 (.pbrt) to Mitsuba 3's XML
@@ -29,6 +30,10 @@ pub(super) struct Convert {
     #[arg(long)]
     strict: bool,
 
+    /// Reads files of the scene's own folder only; without, also others that the scene names plainly
+    #[arg(long)]
+    confine: bool,
+
     /// Sets a parameter that the file declares as a `default`; may be repeated
     #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = values::define)]
     defines: Vec<(String, String)>,
@@ -36,7 +41,7 @@ pub(super) struct Convert {
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Convert) -> Result<(), Failure> {
-    let Convert { input, output, strict, defines } = arguments;
+    let Convert { input, output, strict, confine, defines } = arguments;
     if output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("xml")) {
         return Err(Failure::input(format_args!("{}: a scene is written as .xml", output.display())));
     }
@@ -45,7 +50,7 @@ pub(super) fn run(arguments: Convert) -> Result<(), Failure> {
     {
         return Err(Failure::input(format_args!("{}: that is the scene to read", output.display())));
     }
-    let job = Job { input, output, defines, strict };
+    let job = Job { input, output, defines, reach: Reach::confined(confine), strict };
     match convert(&job) {
         Ok(report) => {
             list(&report.notes);

@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::loading::{self, Building};
 use super::values;
 use crate::embree::Device;
-use crate::load::{self, Watch};
+use crate::load::{self, Reach, Watch};
 use crate::scene::{Features, Scene, SceneDescription};
 
 /// A scene file and values for its parameters.
@@ -22,6 +22,10 @@ pub(super) struct SceneArguments {
     /// Sets a parameter that the file declares as a `default`; may be repeated
     #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = values::define)]
     pub defines: Vec<(String, String)>,
+
+    /// Reads files of the scene's own folder only; without, also others that the scene names plainly
+    #[arg(long)]
+    pub confine: bool,
 }
 
 /// A scene that is ready.
@@ -45,7 +49,8 @@ impl SceneArguments {
     /// The words of the command line that name the same scene.
     pub fn in_words(&self) -> String {
         let defines = self.defines.iter().map(|(name, value)| format!(" -D {name}={value}"));
-        std::iter::once(self.path.display().to_string()).chain(defines).collect()
+        let confine = self.confine.then(|| " --confine".to_owned());
+        std::iter::once(self.path.display().to_string()).chain(defines).chain(confine).collect()
     }
 
     /// Reads the file and builds the scene, on so many threads or as many as the machine runs at once; shows how far that
@@ -59,7 +64,7 @@ impl SceneArguments {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(number(threads)).thread_name(|i| format!("load {i}"));
         let pool = pool.build().map_err(Failure::running)?;
         let watch = Watch::default();
-        let load = || pool.install(|| load::watched(&self.path, &self.defines, &watch));
+        let load = || pool.install(|| load::watched(&self.path, &self.defines, Reach::confined(self.confine), &watch));
         loading::shown(!quiet, &watch, load).map_err(Failure::shown)
     }
 }

@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::failure::Failure;
 use super::{render, signals};
 use crate::film::file::{FileError, write_whole};
+use crate::load::Reach;
 use crate::render::{Observer, Settings, Status};
 use crate::study::collect::collect;
 use crate::study::file::{self, Budget, Study};
@@ -32,6 +33,10 @@ pub(super) struct StudyArguments {
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
 
+    /// Reads files of each scene's own folder only; without, also others that the scene names plainly
+    #[arg(long)]
+    confine: bool,
+
     /// Lists the runs with the time they should take, and does none
     #[arg(long)]
     dry_run: bool,
@@ -43,10 +48,11 @@ pub(super) struct StudyArguments {
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: StudyArguments) -> Result<(), Failure> {
-    let study = file::read(&arguments.file, &parse_options).map_err(|error| match error {
+    let mut study = file::read(&arguments.file, &parse_options).map_err(|error| match error {
         file::StudyError::Content(faults) => Failure::Input(faults),
         file::StudyError::File(error) => Failure::input(error),
     })?;
+    study.reach = Reach::confined(arguments.confine);
     let prepared = prepare(&study).map_err(Failure::Input)?;
     let jobs = jobs(&study, &prepared);
     let output = arguments.output();

@@ -16,6 +16,7 @@ use super::meshes::Mesh;
 use super::pictures;
 use crate::film::file::FileError;
 use crate::film::{Image, exr_file};
+use crate::load::access::tidy;
 
 /// Paths of a conversion's output, and what it has made so far.
 pub(super) struct Files {
@@ -148,14 +149,7 @@ fn settled(path: &Path) -> PathBuf {
     if let Ok(path) = path.canonicalize() {
         return path;
     }
-    let mut settled = PathBuf::new();
-    for part in absolute(path).unwrap_or_else(|_| path.to_owned()).components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir => drop(settled.pop()),
-            part => settled.push(part),
-        }
-    }
+    let settled = tidy(&absolute(path).unwrap_or_else(|_| path.to_owned()));
     match (settled.parent().map(Path::canonicalize), settled.file_name()) {
         (Some(Ok(folder)), Some(name)) => folder.join(name),
         _ => settled,

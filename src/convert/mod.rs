@@ -25,7 +25,7 @@ use std::rc::Rc;
 pub use notes::{Kind, Note};
 
 use crate::film::file::{FileError, check_writable, write_whole};
-use crate::load::LoadError;
+use crate::load::{self, LoadError, Reach};
 use files::Files;
 use notes::Notes;
 use xml::Element;
@@ -42,6 +42,8 @@ pub struct Job {
     pub output: PathBuf,
     /// `-D` names and values, which go before defaults in the file.
     pub defines: Vec<(String, String)>,
+    /// How far the names in the scene may lead.
+    pub reach: Reach,
     /// Whether to write nothing where something would be left out.
     pub strict: bool,
 }
@@ -84,11 +86,8 @@ pub fn convert(job: &Job) -> Result<Report, ConvertError> {
         return Err(of_input(format!("is no scene format that can be converted; known: {}", known.join(", "))));
     };
     check_writable(&job.output)?;
-    let (notes, files) = (Notes::default(), Files::new(&job.output));
-    let bytes = std::fs::read(&job.input).map_err(|error| of_input(format!("cannot be read: {error}")))?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        of_input(format!("is not UTF-8 text: invalid at byte {}", error.utf8_error().valid_up_to()))
-    })?;
+    let (notes, files) = (Notes::new(&job.input, job.reach), Files::new(&job.output));
+    let text = load::text_of(&job.input).map_err(of_input)?;
     let source = notes.add(&job.input, text.into());
     let scene = convert(&job.input, source, &job.defines, &files, &notes);
 

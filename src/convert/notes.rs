@@ -1,13 +1,14 @@
 //! What a conversion has to say: faults of the input, what was left out, and what will look different.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use crate::load::LoadError;
-use crate::load::faults::{Span, position};
+use crate::load::access::Access;
+use crate::load::{self, LoadError, Reach};
+use crate::load::faults::{MOST_FAULTS, Places, Span};
 
 /// What a note is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,27 +64,56 @@ struct Source {
 }
 
 /// Collects what there is to say while files are read.
-#[derive(Default)]
 pub(super) struct Notes {
+    /// Which files the scene may have read.
+    access: Access,
+    /// Bytes of all text so far.
+    read: Cell<u64>,
     sources: RefCell<Vec<Source>>,
     faults: RefCell<Vec<(Place, String)>>,
     /// Each thing once, in the order of the files.
     notes: RefCell<BTreeSet<(usize, usize, Kind, String)>>,
 }
 
+/// Most files of a scene that are text, counted as often as they are included: files that include others several times
+/// over grow without bounds.
+const MOST_SOURCES: usize = 1 << 14;
+
 impl Notes {
+    /// Of a scene file whose names may lead so far.
+    pub fn new(path: &Path, reach: Reach) -> Notes {
+        Notes {
+            access: Access::new(path.parent().unwrap_or(Path::new("")), reach),
+            read: Cell::default(),
+            sources: RefCell::default(),
+            faults: RefCell::default(),
+            notes: RefCell::default(),
+        }
+    }
+
+    /// The path of a file that is named in a folder, or in a sentence why it is not read; `is_plain` tells whether the name
+    /// stands in the scene as it is.
+    pub fn file(&self, folder: &Path, name: &str, is_plain: bool) -> Result<PathBuf, String> {
+        self.access.file(folder, name, is_plain)
+    }
+
     /// Reads a file; gives its number and its text.
     pub fn read(&self, path: &Path) -> Result<(usize, Rc<str>), String> {
-        let bytes = std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            format!("{}: is not UTF-8 text: invalid at byte {}", path.display(), error.utf8_error().valid_up_to())
-        })?;
+        let in_file = |reason: String| format!("{}: {reason}", path.display());
+        if self.sources.borrow().len() >= MOST_SOURCES {
+            return Err(in_file(format!("the scene includes more than {MOST_SOURCES} files, each counted as often as it is")));
+        }
+        let text = load::text_of(path).map_err(in_file)?;
+        if self.read.get() + text.len() as u64 > load::MOST_TEXT {
+            return Err(in_file(format!("with it, the scene's text is longer than {} bytes", load::MOST_TEXT)));
+        }
         Ok(self.add(path, text.into()))
     }
 
     /// Adds a file that has been read.
     pub fn add(&self, path: &Path, text: Rc<str>) -> (usize, Rc<str>) {
         let mut sources = self.sources.borrow_mut();
+        self.read.set(self.read.get() + text.len() as u64);
         sources.push(Source { path: path.to_owned(), text: text.clone() });
         (sources.len() - 1, text)
     }
@@ -98,9 +128,16 @@ impl Notes {
         self.sources.borrow().first().and_then(|first| first.path.parent()).unwrap_or(Path::new("")).to_owned()
     }
 
+    /// Whether as many faults are found as are told.
+    fn is_full(&self) -> bool {
+        self.faults.borrow().len() >= MOST_FAULTS
+    }
+
     /// Something is wrong with the input.
     pub fn fault(&self, place: &Place, message: impl Into<String>) {
-        self.faults.borrow_mut().push((place.clone(), message.into()));
+        if !self.is_full() {
+            self.faults.borrow_mut().push((place.clone(), message.into()));
+        }
     }
 
     /// Something of the scene is not written.
@@ -122,9 +159,12 @@ impl Notes {
         let sources = self.sources.into_inner();
         let mut faults = self.faults.into_inner();
         if faults.is_empty() {
-            let note = |(source, byte, kind, message): (usize, usize, Kind, String)| {
-                let Source { path, text } = &sources[source];
-                Note { kind, path: path.clone(), position: position(text, byte), message }
+            let mut places: Vec<_> = sources.iter().map(|source| Places::of(&source.text)).collect();
+            let note = |(source, byte, kind, message): (usize, usize, Kind, String)| Note {
+                kind,
+                path: sources[source].path.clone(),
+                position: places[source].position(byte),
+                message,
             };
             return Ok(self.notes.into_inner().into_iter().map(note).collect());
         }

@@ -6,16 +6,20 @@
 //! window the part of it that the file has. Metadata are attributes `relt.NAME`, strings
 //! or doubles; the prefix keeps them apart from the format's own.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer};
 use exr::math::Vec2;
+use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
 use exr::meta::header::{ImageAttributes, LayerAttributes};
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
 
 use super::file::{FileError, write_whole};
 use super::image::{Image, PixelFormat, Plane, Window};
+use crate::memory;
 
 /// A piece of metadata.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,21 +165,22 @@ fn text(words: &str) -> Text {
 
 /// Reads a file's image, layers and metadata.
 pub fn read_file(path: &Path) -> Result<Contents, FileError> {
-    let file = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_file(path)
-        .map_err(|error| FileError::read(path, error))?;
+    let file = File::open(path).map_err(|error| FileError::read(path, error))?;
+    read_from(BufReader::new(file)).map_err(|reason| FileError::read(path, reason))
+}
+
+/// Reads what a file holds, or says in a sentence why it cannot.
+pub fn read_from(mut source: impl BufRead + Seek) -> Result<Contents, String> {
+    check_size(&mut source)?;
+    source.rewind().map_err(|error| error.to_string())?;
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let file = reader.non_parallel().from_buffered(source).map_err(|error| error.to_string())?;
     let layer = file.layer_data;
     let (width, height) = (layer.size.0 as u32, layer.size.1 as u32);
     let mut channels = Vec::new();
     for channel in layer.channel_data.list {
         if channel.sampling.0 != 1 || channel.sampling.1 != 1 {
-            return Err(FileError::read(path, format_args!("channel {} is subsampled", words(&channel.name))));
+            return Err(format!("channel {} is subsampled", words(&channel.name)));
         }
         channels.push((words(&channel.name), channel.sample_data.values_as_f32().collect()));
     }
@@ -187,7 +192,7 @@ pub fn read_file(path: &Path) -> Result<Contents, FileError> {
         },
         None => match planes.iter().position(|(name, _)| name == GRAY).map(|root| planes.swap_remove(root)) {
             Some((_, Plane::Gray(values))) => Image::new(width, height, values.iter().map(|y| [*y; 3]).collect()),
-            _ => return Err(FileError::read(path, "it has no channels R, G, B, nor Y")),
+            _ => return Err("it has no channels R, G, B, nor Y".into()),
         },
     };
     planes.sort_by(|a, b| a.0.cmp(&b.0));
@@ -206,6 +211,26 @@ pub fn read_file(path: &Path) -> Result<Contents, FileError> {
         .collect();
     metadata.sort_by(|a, b| a.0.cmp(&b.0));
     Ok(Contents { image, layers: planes, metadata })
+}
+
+/// Widest and highest picture, in pixels: that of a film.
+pub const MOST_PIXELS_ACROSS: usize = 65_536;
+/// Bytes that a sample of a channel takes while a file is read: as it is in the file, as a number, and in its layer.
+const BYTES_OF_SAMPLE: u64 = 4 + 4 + 4;
+
+/// Whether a picture of the size that its header claims can be had: told before any memory is asked for.
+fn check_size(source: &mut impl BufRead) -> Result<(), String> {
+    let parts = MetaData::read_from_buffered(source, false).map_err(|error| error.to_string())?.headers;
+    for part in parts {
+        let Vec2(width, height) = part.layer_size;
+        let channels = part.channels.list.len();
+        if width.max(height) > MOST_PIXELS_ACROSS {
+            return Err(format!("it has {width} × {height} pixels; accepted: up to {MOST_PIXELS_ACROSS} each way"));
+        }
+        let bytes = BYTES_OF_SAMPLE * (width * height) as u64 * channels as u64;
+        memory::check(bytes, format_args!("{width} × {height} pixels in {channels} channels"))?;
+    }
+    Ok(())
 }
 
 /// Puts channels together again: `name.R`, `.G` and `.B` to colours, anything else to gray planes, `name.Y` under

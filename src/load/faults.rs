@@ -1,6 +1,8 @@
 //! What is wrong with a file, and where.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
+use std::collections::HashSet;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -39,13 +41,18 @@ struct Contents {
 pub(crate) struct Faults {
     found: RefCell<Vec<(Option<Span>, String)>>,
     /// Places whose value is not known, so that what else is wrong there only follows from that.
-    unknown: RefCell<Vec<Span>>,
+    unknown: RefCell<HashSet<Span>>,
 }
+
+/// Most faults of a file that are told: whoever sees more has another kind of file, and telling takes time and memory.
+pub(crate) const MOST_FAULTS: usize = 1000;
+/// Most names that a message lists.
+const MOST_NAMES: usize = 100;
 
 impl Faults {
     /// A fault at a place of the file.
     pub fn at(&self, span: &Span, message: impl Into<String>) {
-        if !self.unknown.borrow().contains(span) {
+        if !self.is_full() && !self.unknown.borrow().contains(span) {
             self.found.borrow_mut().push((Some(span.clone()), message.into()));
         }
     }
@@ -53,7 +60,12 @@ impl Faults {
     /// A fault that leaves a place without a value.
     pub fn without_value(&self, span: &Span, message: impl Into<String>) {
         self.at(span, message);
-        self.unknown.borrow_mut().push(span.clone());
+        self.unknown.borrow_mut().insert(span.clone());
+    }
+
+    /// Whether as many faults are found as are told, so that messages of more need not be made.
+    pub fn is_full(&self) -> bool {
+        self.found.borrow().len() >= MOST_FAULTS
     }
 
     /// A fault of the file as a whole.
@@ -63,7 +75,10 @@ impl Faults {
 
     /// A name that is not among those known, as in `unknown bsdf "glas"; known: diffuse`.
     pub fn unknown(&self, span: &Span, what: &str, name: &str, known: &[&str]) {
-        self.at(span, format!("unknown {what} {name:?}{}; {}", did_you_mean(name, known), list(known)));
+        if !self.is_full() {
+            let name = shortened(name);
+            self.at(span, format!("unknown {what} {name:?}{}; {}", did_you_mean(&name, known), list(known)));
+        }
     }
 
     /// `Ok` with the value that was read if nothing was wrong.
@@ -80,15 +95,19 @@ impl Faults {
 }
 
 impl LoadError {
-    /// Faults at these places of the text, or of the file as a whole.
+    /// Faults at these places of the text, best in its order, or of the file as a whole.
     pub(crate) fn of_places(path: &Path, text: String, found: Vec<(Option<Span>, String)>) -> LoadError {
-        let faults = found
-            .into_iter()
-            .map(|(span, message)| {
-                let position = span.as_ref().map(|s| position(&text, s.start));
-                Fault { message, position, span }
-            })
-            .collect();
+        let is_full = found.len() >= MOST_FAULTS;
+        let mut places = Places::of(&text);
+        let fault = |(span, message): (Option<Span>, String)| {
+            let position = span.as_ref().map(|s| places.position(s.start));
+            Fault { message, position, span }
+        };
+        let mut faults: Vec<_> = found.into_iter().take(MOST_FAULTS).map(fault).collect();
+        if is_full {
+            let message = format!("has at least these {MOST_FAULTS} faults; there may be more");
+            faults.push(Fault { message, position: None, span: None });
+        }
         LoadError::new(path, text, faults)
     }
 
@@ -137,35 +156,83 @@ impl Diagnostic for LoadError {
     }
 }
 
-/// Line and column, from 1, of a byte of the text.
-pub(crate) fn position(text: &str, byte: usize) -> (usize, usize) {
-    let before = text.get(..byte).expect("spans begin between characters");
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+/// Lines and columns of a text, quickly where they are asked for in its order.
+pub(crate) struct Places<'a> {
+    text: &'a str,
+    /// A byte whose line and column are known.
+    byte: usize,
+    known: (usize, usize),
+}
+
+impl<'a> Places<'a> {
+    /// Of a text.
+    pub fn of(text: &'a str) -> Places<'a> {
+        Places { text, byte: 0, known: (1, 1) }
+    }
+
+    /// Line and column, from 1, of a byte.
+    pub fn position(&mut self, byte: usize) -> (usize, usize) {
+        if byte < self.byte {
+            (self.byte, self.known) = (0, (1, 1));
+        }
+        let between = self.text.get(self.byte..byte).expect("spans begin between characters");
+        let (line, column) = self.known;
+        self.byte = byte;
+        self.known = match between.rfind('\n') {
+            None => (line, column + between.chars().count()),
+            Some(newline) => (line + between.matches('\n').count(), between[newline + 1..].chars().count() + 1),
+        };
+        self.known
+    }
 }
 
 /// `known: a, b, c`, sorted.
 pub(crate) fn list(known: &[&str]) -> String {
+    if known.is_empty() {
+        return "none is known here".into();
+    }
     let mut known = known.to_vec();
+    let more = known.len().saturating_sub(MOST_NAMES);
+    if more > 0 {
+        known.select_nth_unstable(MOST_NAMES); // the first are all that need be in order
+        known.truncate(MOST_NAMES);
+    }
     known.sort_unstable();
-    if known.is_empty() { "none is known here".into() } else { format!("known: {}", known.join(", ")) }
+    let names: Vec<_> = known.into_iter().map(shortened).collect();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("known: {}{more}", names.join(", "))
+}
+
+/// A name as it stands in messages: cut where it is longer than a line.
+pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
+    match name.char_indices().nth(80) {
+        None => name.into(),
+        Some((end, _)) => format!("{}…", &name[..end]).into(),
+    }
 }
 
 /// ` (did you mean "glass"?)` where a known name is near, or nothing.
 pub(crate) fn did_you_mean(name: &str, known: &[&str]) -> String {
-    let near = known.iter().map(|k| (edits(name, k), k)).min();
+    let length = name.chars().take(MOST_LETTERS).count();
+    // as many letters as lengths differ by are wrong at least, and a third of them is no slip of the finger any more
+    let may_be_near = |k: &&&str| 3 * k.chars().take(MOST_LETTERS).count().abs_diff(length) <= k.len();
+    let near = known.iter().filter(may_be_near).take(MOST_COMPARED).map(|k| (edits(name, k), k)).min();
     match near {
-        // A third of the letters wrong is no longer a slip of the finger.
         Some((edits, near)) if edits > 0 && 3 * edits <= near.len() => format!(" (did you mean {near:?}?)"),
         _ => String::new(),
     }
 }
 
+/// Names of about the same length that are compared.
+const MOST_COMPARED: usize = 1000;
+/// Letters of a name that are looked at.
+const MOST_LETTERS: usize = 64;
+
 /// Number of letters to insert, delete, replace or swap with their neighbour to get from one name to the other.
 ///
 /// Source: Damerau 1964 (optimal string alignment), on ASCII case folded letters.
 fn edits(a: &str, b: &str) -> usize {
-    let fold = |s: &str| s.chars().take(64).map(|c| c.to_ascii_lowercase()).collect::<Vec<_>>();
+    let fold = |s: &str| s.chars().take(MOST_LETTERS).map(|c| c.to_ascii_lowercase()).collect::<Vec<_>>();
     let (a, b) = (fold(a), fold(b));
     let mut d = vec![vec![0; b.len() + 1]; a.len() + 1];
     for i in 0..=a.len() {
@@ -203,7 +270,11 @@ mod tests {
 
     #[test]
     fn columns_count_characters_and_lines_start_at_one() {
-        assert_eq!(position("ab\nçd", 0), (1, 1));
-        assert_eq!(position("ab\nçd", 5), (2, 2));
+        let text = "ab\nçd\n\ne";
+        let expected = [(0, (1, 1)), (1, (1, 2)), (3, (2, 1)), (5, (2, 2)), (7, (3, 1)), (8, (4, 1))];
+        let mut places = Places::of(text);
+        for (byte, position) in expected.into_iter().chain(expected) {
+            assert_eq!(places.position(byte), position, "{byte}, in order and back again");
+        }
     }
 }

@@ -9,6 +9,7 @@ use image::{DynamicImage, ImageReader, Limits};
 use rayon::prelude::*;
 
 use crate::film::exr_file;
+use crate::memory;
 use crate::scene::textures::{Image, Texels};
 
 /// Widest and highest picture, in texels.
@@ -16,6 +17,9 @@ const MOST_TEXELS_ACROSS: u32 = 65_536;
 
 /// Most memory that decoding a picture may take, in bytes. Keeps small files of huge pictures from exhausting memory.
 const MOST_MEMORY: u64 = 4 << 30;
+
+/// Bytes that a texel takes at most while its picture is decoded: as four numbers and, made of them, as three.
+const BYTES_OF_TEXEL: u64 = 4 * 4 + 3 * 4;
 
 /// Pictures by file, each read once.
 pub struct Images(HashMap<PathBuf, Result<Arc<Image>, String>>);
@@ -40,8 +44,13 @@ impl Images {
 pub fn read(path: &Path) -> Result<Image, String> {
     let in_file = |message: String| format!("{}: {message}", path.display());
     let bytes = std::fs::read(path).map_err(|error| in_file(format!("cannot be read: {error}")))?;
-    let image = if bytes.starts_with(&OPENEXR) { read_exr(path) } else { decode(&bytes) }.map_err(in_file)?;
-    check(&image).map_err(in_file)?;
+    decode(&bytes).map_err(in_file)
+}
+
+/// Reads the content of a file.
+pub fn decode(bytes: &[u8]) -> Result<Image, String> {
+    let image = if bytes.starts_with(&OPENEXR) { decode_exr(bytes) } else { decode_other(bytes) }?;
+    check(&image)?;
     Ok(image)
 }
 
@@ -49,17 +58,22 @@ pub fn read(path: &Path) -> Result<Image, String> {
 const OPENEXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// The colours of an OpenEXR file.
-fn read_exr(path: &Path) -> Result<Image, String> {
-    let contents = exr_file::read_file(path).map_err(|error| error.to_string())?;
-    let image = contents.image;
+fn decode_exr(bytes: &[u8]) -> Result<Image, String> {
+    let image = exr_file::read_from(Cursor::new(bytes))?.image;
     Ok(Image { width: image.width, height: image.height, texels: Texels::Floats(image.pixels) })
 }
 
 /// The other formats.
-fn decode(bytes: &[u8]) -> Result<Image, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+fn decode_other(bytes: &[u8]) -> Result<Image, String> {
+    let open = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string());
+    let (sized, mut reader) = (open()?, open()?);
     if reader.format().is_none() {
         return Err("is no picture that relt reads; known: PNG, JPEG, HDR, OpenEXR".into());
+    }
+    let (width, height) = sized.into_dimensions().map_err(|error| format!("cannot be decoded: {error}"))?;
+    if width.max(height) <= MOST_TEXELS_ACROSS {
+        let bytes = BYTES_OF_TEXEL * u64::from(width) * u64::from(height);
+        memory::check(bytes, format_args!("{width} × {height} texels"))?;
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(MOST_TEXELS_ACROSS);

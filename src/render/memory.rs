@@ -1,10 +1,10 @@
 //! Memory that a film takes, and whether it can be had: told before any of it is asked for.
 
-use std::fs;
-
 use super::settings::{MappingChoice, Method, Settings};
 use crate::chain::LargeSteps;
 use crate::film::Accumulator;
+pub use crate::memory::available;
+use crate::memory::gigabytes;
 use crate::scene::description::FilmDescription;
 use crate::tempering::{Choices, LadderChoice, Layers};
 
@@ -82,35 +82,6 @@ impl FilmMemory {
     }
 }
 
-/// Bytes that this process may still ask for: what the system says is available, or what is left of the limit that a
-/// container has. `None` where it is not told.
-pub fn available() -> Option<u64> {
-    let system = fs::read_to_string("/proc/meminfo").ok().and_then(|text| of_meminfo(&text));
-    let number = |file: &str| fs::read_to_string(format!("/sys/fs/cgroup/{file}")).ok()?.trim().parse::<u64>().ok();
-    // of what a group uses, the cache of files can be had back
-    let container = number("memory.max").zip(number("memory.current")).map(|(most, now)| {
-        let stat = fs::read_to_string("/sys/fs/cgroup/memory.stat").unwrap_or_default();
-        let cache = stat.lines().find_map(|line| line.strip_prefix("file ")?.parse::<u64>().ok()).unwrap_or(0);
-        (most + cache).saturating_sub(now)
-    });
-    match (system, container) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    }
-}
-
-/// `MemAvailable` of Linux, which counts what caches would give back.
-fn of_meminfo(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
-}
-
-/// `1.5 GB`.
-fn gigabytes(bytes: u64) -> String {
-    format!("{:.1} GB", bytes as f64 / 1e9)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,13 +110,5 @@ mod tests {
         assert!(memory.fault(memory.most).is_none());
         let fault = memory.fault(memory.most - 1).unwrap();
         assert!(fault.contains("16384 × 16384 pixels in 1 layer take 17.2 GB"), "{fault}");
-    }
-
-    #[test]
-    fn what_the_system_says_is_read() {
-        let text = "MemTotal:       24000000 kB\nMemFree: 1 kB\nMemAvailable:   22000000 kB\n";
-        assert_eq!(of_meminfo(text), Some(22_000_000 * 1024));
-        assert_eq!(of_meminfo("MemTotal: 5 kB\n"), None);
-        assert_eq!(of_meminfo("MemAvailable: lots kB\n"), None);
     }
 }

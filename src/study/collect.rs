@@ -164,6 +164,7 @@ mod tests {
             baseline: 0,
             scenes: Vec::<StudyScene>::new(),
             methods: Vec::<StudyMethod>::new(),
+            reach: Default::default(),
             text: String::new(),
         }
     }

@@ -36,7 +36,9 @@ use toml::{Spanned, Table, Value};
 
 use super::results::{Clock, Stage};
 use crate::film::file::FileError;
+use crate::load::{self, LoadError, Reach, Watch};
 use crate::render::Settings;
+use crate::scene::SceneDescription;
 
 /// A study file as it was read, all methods spelled out.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +65,8 @@ pub struct Study {
     pub scenes: Vec<StudyScene>,
     /// One at least; names are unique.
     pub methods: Vec<StudyMethod>,
+    /// How far the names in its scenes may lead; the file says nothing of it.
+    pub reach: Reach,
     /// The file itself.
     pub text: String,
 }
@@ -170,12 +174,16 @@ struct SceneEntry {
 
 /// Seeds of a study that names none.
 const SEEDS: u64 = 5;
+/// Most seeds of a study.
+const MOST_SEEDS: usize = 10_000;
+/// Most methods that the lists of one entry make.
+const MOST_COMBINATIONS: usize = 10_000;
 /// Snapshots of a run where the study does not say.
 const SNAPSHOTS: usize = 12;
 /// Errors are first taken after this part of the budget where the study does not say.
 const FIRST_SNAPSHOT: f64 = 1.0 / 64.0;
 /// Options that the study itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 14] = [
+const NOT_OPTIONS: [&str; 15] = [
     "seed",
     "mpp",
     "time",
@@ -184,6 +192,7 @@ const NOT_OPTIONS: [&str; 14] = [
     "log",
     "checkpoint",
     "checkpoint-file",
+    "confine",
     "resume",
     "part",
     "parts",
@@ -287,6 +296,7 @@ impl Reader<'_> {
             baseline,
             scenes,
             methods,
+            reach: Reach::default(),
             text: self.text.to_owned(),
         })
     }
@@ -295,9 +305,13 @@ impl Reader<'_> {
         let Some(given) = seeds else { return (1..=SEEDS).collect() };
         let span = given.span();
         let seeds: Vec<u64> = match given.into_inner() {
-            Seeds::Number(n) => (1..=n.min(10_000)).collect(),
+            Seeds::Number(n) => (1..=n.min(MOST_SEEDS as u64 + 1)).collect(),
             Seeds::List(list) => list,
         };
+        if seeds.len() > MOST_SEEDS {
+            self.fault(span, format!("`seeds` are more than {MOST_SEEDS}, which is the most accepted"));
+            return Vec::new();
+        }
         if seeds.is_empty() {
             self.fault(span.clone(), "`seeds` are none; one at least is needed, five tell how results spread");
         }
@@ -420,7 +434,13 @@ impl Reader<'_> {
                 }
             })
             .collect();
-        let combinations = axes.map(|axes| grid(&axes)).unwrap_or_default();
+        let Some(axes) = axes else { return Vec::new() };
+        let count = axes.iter().try_fold(1usize, |count, (_, values)| count.checked_mul(values.len()));
+        if count.is_none_or(|count| count > MOST_COMBINATIONS) {
+            self.fault(span, format!("its lists make more than {MOST_COMBINATIONS} methods, which is the most accepted"));
+            return Vec::new();
+        }
+        let combinations = grid(&axes);
         combinations.iter().filter_map(|options| self.method(span.clone(), name.as_deref(), options, parse)).collect()
     }
 
@@ -532,6 +552,13 @@ fn tidy(path: &Path) -> PathBuf {
         }
     }
     tidied
+}
+
+impl StudyScene {
+    /// Reads its file.
+    pub fn describe(&self, reach: Reach) -> Result<SceneDescription, LoadError> {
+        load::watched(&self.file, &self.defines, reach, &Watch::default())
+    }
 }
 
 impl Study {

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use super::file::{Budget, Study};
 use super::jobs::StudyJob;
 use crate::embree::Device;
-use crate::load;
 use crate::render::{self, Job, Settings};
 use crate::scene::Scene;
 
@@ -40,7 +39,7 @@ pub fn times(study: &Study, jobs: &[&StudyJob]) -> Result<Vec<Duration>, String>
 fn trial(study: &Study, job: &StudyJob, mpp: f64) -> Result<Duration, String> {
     let begin = Instant::now();
     let scene = &study.scenes[job.scene];
-    let description = load::scene(&scene.file, &scene.defines).map_err(|error| error.to_string())?;
+    let description = scene.describe(study.reach).map_err(|error| error.to_string())?;
     let device = Device::new("").map_err(|error| error.to_string())?;
     let scene = Scene::new(&device, description).map_err(|error| error.to_string())?;
     let before = begin.elapsed();

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::file::{Budget, Study};
+use super::file::{Budget, Study, StudyScene};
 use super::file_name;
 use super::metrics::Reference;
 use crate::checksum::Checksum;
-use crate::load;
+use crate::load::Reach;
 use crate::render::Settings;
 use crate::scene::SceneDescription;
 
@@ -52,7 +52,7 @@ pub fn prepare(study: &Study) -> Result<Vec<Prepared>, Vec<String>> {
     let mut faults = Vec::new();
     let mut prepared = Vec::new();
     for scene in &study.scenes {
-        match prepare_scene(&scene.file, &scene.defines, &scene.reference) {
+        match prepare_scene(scene, study.reach) {
             Ok(scene) => prepared.push(scene),
             Err(fault) => faults.push(fault),
         }
@@ -60,8 +60,9 @@ pub fn prepare(study: &Study) -> Result<Vec<Prepared>, Vec<String>> {
     if faults.is_empty() { Ok(prepared) } else { Err(faults) }
 }
 
-fn prepare_scene(file: &Path, defines: &[(String, String)], reference: &Path) -> Result<Prepared, String> {
-    let description = load::scene(file, defines).map_err(|error| format!("{:?}", miette::Report::new(error)))?;
+fn prepare_scene(scene: &StudyScene, reach: Reach) -> Result<Prepared, String> {
+    let StudyScene { file, reference, .. } = scene;
+    let description = scene.describe(reach).map_err(|error| format!("{:?}", miette::Report::new(error)))?;
     let found = Reference::read(reference).map_err(|faults| faults.join("\n"))?;
     let (film, size) = (&description.film, [found.image.width, found.image.height]);
     let fitting = match size == [film.width, film.height] {
@@ -163,7 +164,8 @@ impl StudyJob {
 pub fn scene_words(study: &Study, scene: usize) -> String {
     let scene = &study.scenes[scene];
     let defines = scene.defines.iter().map(|(name, value)| format!(" -D {}", quoted(&format!("{name}={value}"))));
-    quoted(&scene.file.display().to_string()) + &defines.collect::<String>()
+    let confine = if study.reach == Reach::Confined { " --confine" } else { "" };
+    quoted(&scene.file.display().to_string()) + &defines.collect::<String>() + confine
 }
 
 /// A word as a shell takes it.

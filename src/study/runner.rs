@@ -16,7 +16,6 @@ use crate::checksum::Checksum;
 use crate::embree::Device;
 use crate::film::file::FileError;
 use crate::film::{Plane, exr_file};
-use crate::load;
 use crate::render::clock::cpu_time;
 use crate::render::log::Log;
 use crate::render::{self, Job, Observer, Picture, RunStart, Status, Stop};
@@ -129,7 +128,7 @@ impl Runner<'_> {
     fn run_to(&self, record: &Path, job: &StudyJob, observer: &dyn Observer) -> Result<(), RunError> {
         let (scene, method) = (&self.study.scenes[job.scene], &self.study.methods[job.method]);
         let (begin, cpu_begin) = (Instant::now(), cpu_time());
-        let description = load::scene(&scene.file, &scene.defines).map_err(RunError::of)?;
+        let description = scene.describe(self.study.reach).map_err(RunError::of)?;
         let loaded = begin.elapsed();
         let device = Device::new("").map_err(RunError::of)?;
         let built_scene = Scene::new(&device, description).map_err(RunError::of)?;

@@ -367,6 +367,7 @@ fn defaults_are_replaced_by_what_is_given_from_outside() {
             input: folder.path("mitsuba/case.xml"),
             output: output.clone(),
             defines,
+            reach: Default::default(),
             strict: true,
         };
         relt::convert::convert(&job).unwrap();

@@ -43,7 +43,7 @@ impl Folder {
     pub fn convert(&self, name: &str) -> Result<(Report, PathBuf), ConvertError> {
         let input = self.path(name);
         let output = input.with_file_name("out.xml");
-        let job = Job { input, output: output.clone(), defines: Vec::new(), strict: false };
+        let job = Job { input, output: output.clone(), defines: Vec::new(), reach: Default::default(), strict: false };
         convert(&job).map(|report| (report, output))
     }
 }

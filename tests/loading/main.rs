@@ -2,8 +2,10 @@
 
 mod appearances;
 mod cameras;
+mod corpora;
 mod descriptions;
 mod faults;
 mod files;
+mod harm;
 mod instances;
 mod memory;

@@ -1,10 +1,10 @@
 //! XML text to a tree of nodes with places: includes and `$names` resolved, names in one spelling.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::convert::notes::{Notes, Place};
-use crate::load::faults::{did_you_mean, list};
+use crate::load::names::{Names, Replaced};
 
 /// An element.
 #[derive(Debug)]
@@ -24,6 +24,8 @@ pub struct Attribute {
     name: String,
     /// Its value, `$names` replaced.
     pub value: String,
+    /// Whether it stands in the file as it is, but for what `-D` says.
+    pub is_plain: bool,
     /// Where the value stands.
     pub place: Place,
 }
@@ -77,7 +79,7 @@ impl Document {
     pub fn resolved<'a>(&'a self, id: &'a str) -> &'a str {
         let mut id = id;
         // an alias of an alias; a ring of them ends as well
-        for _ in 0..self.aliases.len() {
+        for _ in 0..MAX_ALIASES {
             match self.aliases.get(id) {
                 Some(of) => id = of,
                 None => break,
@@ -106,38 +108,33 @@ fn gather<'a>(node: &'a Node, ids: &mut HashMap<&'a str, &'a Node>) {
 /// Deepest nesting of elements, and of files that include others. Keeps hostile files from exhausting the stack.
 const MAX_NESTING: usize = 64;
 const MAX_INCLUDES: usize = 16;
+/// Most aliases of one another that are followed.
+const MAX_ALIASES: usize = 64;
 
 /// Reads a scene file; `defines` go before the defaults in it.
 pub fn read(path: &Path, text: &str, source: usize, defines: &[(String, String)], notes: &Notes) -> Option<Document> {
     let mut reader = Reader {
         notes,
-        names: defines.iter().cloned().collect(),
-        used: BTreeSet::new(),
+        names: Names::new(defines),
         aliases: HashMap::new(),
         files: vec![path.to_owned()],
     };
-    let scene = reader.file(text, source)?;
-    let unused = defines.iter().filter(|(name, _)| !reader.used.contains(name));
-    for (name, value) in unused {
-        let known: Vec<_> = reader.used.iter().map(String::as_str).collect();
-        let message = format!("-D {name}={value} has no effect: the scene uses no ${name}; {}", list(&known));
-        notes.fault(&scene.place, message);
-    }
+    let scene = reader.file(text, source, 0)?;
+    reader.names.unused().into_iter().for_each(|message| notes.fault(&scene.place, message));
     Some(Document { scene, aliases: reader.aliases })
 }
 
 struct Reader<'a> {
     notes: &'a Notes,
-    names: BTreeMap<String, String>,
-    used: BTreeSet<String>,
+    names: Names<'a>,
     aliases: HashMap<String, String>,
     /// The file that is being read and those that include it.
     files: Vec<PathBuf>,
 }
 
 impl Reader<'_> {
-    /// The root of a file.
-    fn file(&mut self, text: &str, source: usize) -> Option<Node> {
+    /// The root of a file that is so deep inside of others.
+    fn file(&mut self, text: &str, source: usize, depth: usize) -> Option<Node> {
         // entities could name other files or grow without bounds; roxmltree refuses the latter and knows no former
         let document = match roxmltree::Document::parse(text) {
             Ok(document) => document,
@@ -153,7 +150,7 @@ impl Reader<'_> {
             self.notes.fault(&Place::new(source, root.range().start..root.range().start + 1), message);
             return None;
         }
-        self.node(root, source, 0)
+        self.node(root, source, depth)
     }
 
     fn node(&mut self, node: roxmltree::Node, source: usize, depth: usize) -> Option<Node> {
@@ -164,23 +161,26 @@ impl Reader<'_> {
             self.notes.fault(&place, format!("elements are nested deeper than {MAX_NESTING} levels"));
             return None;
         }
-        let mut attributes = Vec::new();
+        let (mut attributes, text) = (Vec::new(), node.document().input_text());
         for given in node.attributes() {
             let place = Place::new(source, given.range_value());
-            let value = self.replaced(given.value(), &place);
-            attributes.push(Attribute { name: given.name().to_owned(), value, place });
+            let stands_there = text[given.range_value()] == *given.value();
+            let fault = |message| self.notes.fault(&place, message);
+            let Replaced { text: value, by_default } = self.names.replaced(given.value(), fault);
+            let is_plain = stands_there && !by_default;
+            attributes.push(Attribute { name: given.name().to_owned(), value, is_plain, place });
         }
         let mut read = Node { tag, place, attributes, children: Vec::new() };
         for child in node.children().filter(|child| child.is_element()) {
             let Some(child) = self.node(child, source, depth + 1) else { continue };
             match &child.tag[..] {
                 "default" => {
-                    self.names.entry(child.value("name").to_owned()).or_insert_with(|| child.value("value").to_owned());
+                    self.names.default(child.value("name"), child.value("value"));
                 }
                 "alias" => {
                     self.aliases.insert(child.value("as").to_owned(), child.value("id").to_owned());
                 }
-                "include" => read.children.extend(self.included(&child)),
+                "include" => read.children.extend(self.included(&child, depth)),
                 _ => read.children.push(child),
             }
         }
@@ -188,9 +188,19 @@ impl Reader<'_> {
     }
 
     /// What the root of another file holds.
-    fn included(&mut self, include: &Node) -> Vec<Node> {
+    fn included(&mut self, include: &Node, depth: usize) -> Vec<Node> {
         let place = include.place_of("filename").clone();
-        let path = self.notes.folder(&place).join(include.value("filename"));
+        let Some(name) = include.attribute("filename") else {
+            self.notes.fault(&include.place, "<include> needs the attribute filename");
+            return Vec::new();
+        };
+        let path = match self.notes.file(&self.notes.folder(&place), &name.value, name.is_plain) {
+            Ok(path) => path,
+            Err(message) => {
+                self.notes.fault(&place, message);
+                return Vec::new();
+            }
+        };
         if self.files.contains(&path) || self.files.len() > MAX_INCLUDES {
             self.notes.fault(&place, format!("{} includes itself, by way of others or directly", path.display()));
             return Vec::new();
@@ -203,34 +213,9 @@ impl Reader<'_> {
             }
         };
         self.files.push(path);
-        let root = self.file(&text, source);
+        let root = self.file(&text, source, depth);
         self.files.pop();
         root.map_or(Vec::new(), |root| root.children)
-    }
-
-    /// The text with every `$name` in it replaced by its value.
-    fn replaced(&mut self, text: &str, place: &Place) -> String {
-        let mut parts = text.split('$');
-        let mut replaced = parts.next().unwrap_or_default().to_owned();
-        for part in parts {
-            let end = part.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(part.len());
-            let (name, rest) = part.split_at(end);
-            match self.names.get(name) {
-                Some(value) => replaced.push_str(value),
-                None => {
-                    let known: Vec<_> = self.names.keys().map(String::as_str).collect();
-                    let near = did_you_mean(name, &known);
-                    let message = format!(
-                        "${name} has no value: no <default> before this, no -D {name}=…{near}; {}",
-                        list(&known)
-                    );
-                    self.notes.fault(place, message);
-                }
-            }
-            self.used.insert(name.to_owned());
-            replaced.push_str(rest);
-        }
-        replaced
     }
 }
 

@@ -15,6 +15,7 @@ mod textures;
 mod transforms;
 mod values;
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
@@ -32,7 +33,12 @@ pub struct Context<'a> {
     ids: HashMap<&'a str, &'a Node>,
     files: &'a Files,
     notes: &'a Notes,
+    /// How many textures are being made, each for the one before.
+    depth: Cell<usize>,
 }
+
+/// Most textures inside one another; more refer to themselves. What is made of a texture doubles with each.
+const MAX_NESTING: usize = 8;
 
 /// Converts the file of that path, text and number.
 pub(super) fn convert(
@@ -49,7 +55,7 @@ pub(super) fn convert(
         Some(Ok(3)) => notes.fault(document.scene.place_of("version"), "the scene is of version 3 already"),
         _ => notes.fault(document.scene.place_of("version"), "the scene's version must be one of 0.x to 2.x"),
     }
-    let context = Context { ids: document.ids(), document: &document, files, notes };
+    let context = Context { ids: document.ids(), document: &document, files, notes, depth: Cell::new(0) };
     Some(context.scene())
 }
 
@@ -104,6 +110,19 @@ impl<'a> Context<'a> {
                 None
             }
         }
+    }
+
+    /// What is made of a texture inside of another, or of one that that refers to; nothing if too many are around it.
+    fn nested<T>(&self, node: &Node, make: impl FnOnce() -> Option<T>) -> Option<T> {
+        if self.depth.get() > MAX_NESTING {
+            let message = format!("the texture is made of itself, or of more than {MAX_NESTING} inside one another");
+            self.notes.fault(&node.place, message);
+            return None;
+        }
+        self.depth.set(self.depth.get() + 1);
+        let made = make();
+        self.depth.set(self.depth.get() - 1);
+        made
     }
 
     /// What a `ref` refers to.

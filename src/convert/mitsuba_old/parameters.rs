@@ -199,9 +199,14 @@ impl<'a> Parameters<'a> {
     /// A file, beside the one that names it or else beside the scene.
     pub fn file(&self, name: &str) -> Option<PathBuf> {
         let child = self.child(name)?;
-        let mut path = self.context.notes.folder(&child.place).join(child.value("value"));
+        let (notes, name) = (self.context.notes, child.attribute("value")?);
+        let find = |folder: PathBuf| {
+            let found = notes.file(&folder, &name.value, name.is_plain);
+            found.map_err(|message| notes.fault(&name.place, message)).ok()
+        };
+        let mut path = find(notes.folder(&child.place))?;
         if !path.is_file() {
-            path = self.context.notes.home().join(child.value("value"));
+            path = find(notes.home())?;
         }
         if !path.is_file() {
             self.context.notes.fault(child.place_of("value"), format!("there is no file {}", path.display()));

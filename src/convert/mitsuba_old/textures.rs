@@ -14,7 +14,7 @@ pub fn value(node: &Node, context: &Context) -> Option<Texture> {
         return values::colour(node, Of::Surface, context.notes).map(Texture::Constant);
     }
     let node = context.referred(node, "texture")?;
-    match node.plugin() {
+    context.nested(node, || match node.plugin() {
         "bitmap" => bitmap(node, context),
         "checkerboard" => checkerboard(node, context),
         "scale" => scale(node, context),
@@ -25,7 +25,7 @@ pub fn value(node: &Node, context: &Context) -> Option<Texture> {
             context.notes.left_out(node.place_of("type"), message);
             None
         }
-    }
+    })
 }
 
 /// The texture inside a `scale` with the factor, where that is one number; any other texture with factor 1.
@@ -39,7 +39,7 @@ pub fn with_factor(node: &Node, context: &Context) -> Option<(Texture, f64)> {
             && g == b
         {
             p.finish();
-            return with_factor(inner, context).map(|(texture, factor)| (texture, factor * r));
+            return context.nested(node, || with_factor(inner, context)).map(|(texture, factor)| (texture, factor * r));
         }
     }
     value(node, context).map(|texture| (texture, 1.0))

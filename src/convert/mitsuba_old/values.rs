@@ -1,6 +1,7 @@
 //! Attribute text to numbers and colours.
 
 use super::document::Node;
+use crate::load;
 use crate::convert::Rgb;
 use crate::convert::notes::Notes;
 use crate::convert::spectra::{self, Spectrum, linear_of_srgb};
@@ -67,9 +68,8 @@ fn blackbody(node: &Node) -> Result<Rgb, String> {
 fn spectrum(node: &Node, of: Of, notes: &Notes) -> Result<Rgb, String> {
     let text = node.value("value");
     let spectrum = if let Some(filename) = node.attribute("filename") {
-        let path = notes.folder(&filename.place).join(&filename.value);
-        let text =
-            std::fs::read_to_string(&path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
+        let path = notes.file(&notes.folder(&filename.place), &filename.value, filename.is_plain)?;
+        let text = load::text_of(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         Spectrum::of_file(&text).map_err(|message| format!("{}: {message}", path.display()))?
     } else if text.contains(':') {
         let pair = |pair: &str| {

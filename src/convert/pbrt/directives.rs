@@ -69,9 +69,9 @@ pub const DIRECTIVES: &[(&str, Action)] = &[
     ("TransformTimes", Numbers(2, |_, _, _, _| {})),
     ("ReverseOrientation", Plain(|state, _, _| state.now.is_reversed = !state.now.is_reversed)),
     ("ColorSpace", Name(color_space)),
-    ("AttributeBegin", Plain(|state, _, _| state.saved.push((Saved::Attribute, state.now.clone())))),
+    ("AttributeBegin", Plain(|state, place, notes| save(state, Saved::Attribute, place, notes))),
     ("AttributeEnd", Plain(|state, place, notes| end(state, Saved::Attribute, place, notes))),
-    ("TransformBegin", Plain(|state, _, _| state.saved.push((Saved::Transform, state.now.clone())))),
+    ("TransformBegin", Plain(|state, place, notes| save(state, Saved::Transform, place, notes))),
     ("TransformEnd", Plain(|state, place, notes| end(state, Saved::Transform, place, notes))),
     ("ObjectBegin", Name(object_begin)),
     ("ObjectEnd", Plain(|state, place, notes| end(state, Saved::Object, place, notes))),
@@ -196,6 +196,18 @@ fn color_space(_: &mut State, name: String, place: Place, notes: &Notes) {
     }
 }
 
+/// Most states that are saved at once, and most parameters that `Attribute` adds at once: each of those holds these.
+const MOST_SAVED: usize = 1024;
+const MOST_ATTRIBUTES: usize = 256;
+
+/// Saves the state up to the directive's end.
+fn save(state: &mut State, what: Saved, place: &Place, notes: &Notes) {
+    if state.saved.len() == MOST_SAVED {
+        return notes.fault(place, format!("{what:?}Begin inside of {MOST_SAVED} others, which is the most accepted"));
+    }
+    state.saved.push((what, state.now.clone()));
+}
+
 /// Goes back to what was saved.
 fn end(state: &mut State, what: Saved, place: &Place, notes: &Notes) {
     match state.saved.last() {
@@ -221,10 +233,10 @@ fn object_begin(state: &mut State, name: String, place: Place, notes: &Notes) {
     if state.object.is_some() {
         return notes.fault(&place, "ObjectBegin inside of another");
     }
-    if state.world.objects.iter().any(|(known, _)| *known == name) {
+    if !state.objects.insert(name.clone()) {
         return notes.fault(&place, format!("the object {name:?} is given twice"));
     }
-    state.saved.push((Saved::Object, state.now.clone()));
+    save(state, Saved::Object, &place, notes);
     state.world.objects.push((name, Vec::new()));
     state.object = Some(state.world.objects.len() - 1);
 }
@@ -251,6 +263,10 @@ fn attribute(state: &mut State, list: Parameters, notes: &Notes) {
     if !known.contains(&&list.kind[..]) {
         return notes
             .fault(&list.place, format!("Attribute of {:?}; {}", list.kind, crate::load::faults::list(&known)));
+    }
+    if state.now.attributes.len() + list.list.len() > MOST_ATTRIBUTES {
+        let message = format!("Attribute: with these it adds more than {MOST_ATTRIBUTES} parameters, which is the most accepted");
+        return notes.fault(&list.place, message);
     }
     state.now.attributes.extend(list.list.into_iter().map(|parameter| (list.kind.clone(), parameter)));
 }

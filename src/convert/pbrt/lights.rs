@@ -159,6 +159,9 @@ fn spot(c: &Converter, light: &Parameters, to_world: DAffine3) -> Option<Element
     )
 }
 
+/// Largest environment that is converted. What is made of it has twice as many pixels, each of sixteen samples.
+const MOST_PIXELS_ACROSS: u32 = 8192;
+
 fn infinite(c: &Converter, light: &Parameters, to_world: DAffine3) -> Option<Element> {
     light.left_out(
         "portal",
@@ -170,10 +173,10 @@ fn infinite(c: &Converter, light: &Parameters, to_world: DAffine3) -> Option<Ele
         return Some(Element::plugin("emitter", "constant").rgb("radiance", c.emission(light, "L", by_power)));
     };
     let square = match c.files.read_picture(&path, false) {
-        Ok(square) if square.width == square.height => square,
+        Ok(square) if square.width == square.height && square.width <= MOST_PIXELS_ACROSS => square,
         Ok(other) => {
             let message = format!(
-                "{}: {} × {} pixels; pbrt's environments are square",
+                "{}: {} × {} pixels; pbrt's environments are square, and accepted up to {MOST_PIXELS_ACROSS} each way",
                 path.display(),
                 other.width,
                 other.height

@@ -37,8 +37,8 @@ const MATERIALS: &[(&str, Make)] = &[
     ("mix", mix),
 ];
 
-/// Most mixtures inside one another; more refer to themselves.
-const MAX_NESTING: usize = 16;
+/// Most mixtures inside one another; more refer to themselves. What is written of a mixture doubles with each.
+const MAX_NESTING: usize = 8;
 
 impl Converter<'_> {
     /// The element of a material on surfaces whose texture coordinates `map` leads to pbrt's.
@@ -321,7 +321,8 @@ fn mix(c: &Converter, p: &Parameters, map: DAffine2, depth: usize) -> Surface {
         return reflecting(Element::plugin("bsdf", "diffuse"));
     };
     if depth > MAX_NESTING {
-        c.notes.fault(&p.place, "the material is a mixture of itself");
+        let message = format!("the material is a mixture of itself, or of more than {MAX_NESTING} inside one another");
+        c.notes.fault(&p.place, message);
         return reflecting(Element::plugin("bsdf", "diffuse"));
     }
     let place = p.place_of("materials");

@@ -51,6 +51,7 @@ pub(super) fn convert(
         gain,
         textures: RefCell::default(),
         materials: RefCell::default(),
+        used: RefCell::default(),
         bsdfs: RefCell::default(),
         ids: RefCell::default(),
     }
@@ -67,10 +68,13 @@ pub struct Converter<'a> {
     /// Textures made, by name.
     textures: RefCell<HashMap<(String, TextureKind), Option<Texture>>>,
     /// Ids of materials written, by all that makes them what they are.
-    materials: RefCell<Vec<(String, String)>>,
+    materials: RefCell<HashMap<String, String>>,
+    /// Indices of those that shapes have.
+    used: RefCell<HashSet<usize>>,
     /// Materials written.
     bsdfs: RefCell<Vec<Element>>,
-    ids: RefCell<HashSet<String>>,
+    /// Ids that are taken, and how many were asked for by the same name before.
+    ids: RefCell<HashMap<String, usize>>,
 }
 
 impl Converter<'_> {
@@ -78,13 +82,14 @@ impl Converter<'_> {
         let mut scene = Element::new("scene").with("version", "3.0.0").holding(self.integrator());
         scene.children.extend(self.sensor());
         let groups = self.groups();
+        let by_name = groups.iter().map(|(name, group)| (*name, group.as_ref())).collect();
         let shapes: Vec<Element> = self.world.shapes.iter().flat_map(|shape| self.shape(shape, false)).collect();
-        let instances: Vec<Element> = self.world.instances.iter().filter_map(|i| self.instance(i, &groups)).collect();
+        let instances: Vec<Element> = self.world.instances.iter().filter_map(|i| self.instance(i, &by_name)).collect();
         let lights = self.world.lights.iter().filter_map(|(light, to_world)| self.light(light, *to_world));
         let lights: Vec<Element> = lights.collect();
         // what was never used has faults as well
         for (index, material) in self.world.materials.iter().enumerate() {
-            if !self.materials.borrow().iter().any(|(key, _)| key.starts_with(&format!("Some({index}) "))) {
+            if !self.used.borrow().contains(&index) {
                 let names: Vec<&str> = material.list.iter().map(|parameter| &parameter.name[..]).collect();
                 material.quiet(&names);
             }
@@ -109,9 +114,9 @@ impl Converter<'_> {
         self.world.objects.iter().map(|object| (&object.0[..], group(object))).collect()
     }
 
-    fn instance(&self, instance: &world::Instance, groups: &[(&str, Option<Element>)]) -> Option<Element> {
-        let Some((_, group)) = groups.iter().find(|(name, _)| *name == instance.name) else {
-            let known: Vec<&str> = groups.iter().map(|(name, _)| *name).collect();
+    fn instance(&self, instance: &world::Instance, groups: &HashMap<&str, Option<&Element>>) -> Option<Element> {
+        let Some(group) = groups.get(&instance.name[..]) else {
+            let known: Vec<&str> = groups.keys().copied().collect();
             let message =
                 format!("no object {:?}{}; {}", instance.name, did_you_mean(&instance.name, &known), list(&known));
             self.notes.fault(&instance.place, message);
@@ -126,11 +131,13 @@ impl Converter<'_> {
     fn unique(&self, name: &str) -> String {
         let mut ids = self.ids.borrow_mut();
         let base = if name.is_empty() { "unnamed" } else { name };
-        let id = (1..)
-            .map(|i| if i == 1 { base.to_owned() } else { format!("{base}-{i}") })
-            .find(|id| !ids.contains(id))
+        let first = ids.get(base).copied().unwrap_or(0) + 1;
+        let (number, id) = (first..)
+            .map(|i| (i, if i == 1 { base.to_owned() } else { format!("{base}-{i}") }))
+            .find(|(_, id)| !ids.contains_key(id))
             .expect("numbers do not end");
-        ids.insert(id.clone());
+        ids.insert(id.clone(), 1);
+        ids.insert(base.to_owned(), number);
         id
     }
 }

@@ -183,7 +183,8 @@ impl Parameters {
     pub fn file(&self, name: &str, notes: &Notes) -> Option<PathBuf> {
         let parameter = self.get(name, &["string"])?;
         let given = parameter.string().filter(|given| !given.is_empty())?;
-        let path = notes.home().join(given);
+        let path = notes.file(&notes.home(), given, true);
+        let path = path.map_err(|message| notes.fault(&parameter.place, message)).ok()?;
         if !path.is_file() {
             notes.fault(&parameter.place, format!("there is no file {}", path.display()));
             return None;

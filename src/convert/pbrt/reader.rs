@@ -146,7 +146,7 @@ impl Reader<'_> {
     fn include(&mut self, place: &Place) -> Result<(), (Place, String)> {
         let (name, at) = self.quoted(place)?;
         // pbrt looks beside the file that was given first
-        let path = self.inputs[0].path.parent().unwrap_or(Path::new("")).join(name);
+        let path = self.notes.file(&self.notes.home(), &name, true).map_err(|message| (at.clone(), message))?;
         if self.inputs.len() > MAX_INCLUDES || self.inputs.iter().any(|input| input.path == path) {
             return Err((at, format!("{} includes itself, by way of others or directly", path.display())));
         }

@@ -81,7 +81,8 @@ impl Converter<'_> {
         let map_key =
             if self.is_textured(&shape.material) || alpha.is_some() { format!("{map:?}") } else { String::new() };
         let key = format!("{index:?} {map_key} {:?}", alpha.as_ref().and(parameter));
-        if let Some((_, id)) = self.materials.borrow().iter().find(|(known, _)| *known == key) {
+        self.used.borrow_mut().extend(index);
+        if let Some(id) = self.materials.borrow().get(&key) {
             return Element::reference(id);
         }
         let mut element = self.material(&shape.material, map);
@@ -94,7 +95,7 @@ impl Converter<'_> {
         };
         let id = self.unique(&name);
         self.bsdfs.borrow_mut().push(element.with("id", &id[..]));
-        self.materials.borrow_mut().push((key, id.clone()));
+        self.materials.borrow_mut().insert(key, id.clone());
         Element::reference(&id)
     }
 

@@ -1,6 +1,7 @@
 //! Colours, refractive indices and metals as pbrt gives them.
 
 use super::parameters::{Parameter, Parameters, Values};
+use crate::load;
 use crate::convert::Rgb;
 use crate::convert::notes::Notes;
 use crate::convert::spectra::{Spectrum, blackbody_hue};
@@ -65,11 +66,11 @@ fn named(name: &str, of: Of, notes: &Notes) -> Result<Rgb, String> {
     if name.starts_with("stdillum-D65") || name == "illum-acesD60" {
         return Ok([1.0; 3]);
     }
-    let path = notes.home().join(name);
-    match std::fs::read_to_string(&path) {
+    let path = notes.file(&notes.home(), name, true)?;
+    match load::text_of(&path) {
         Ok(text) => Spectrum::of_file(&text).map(|s| colour_of(&s, of)).map_err(|m| format!("{}: {m}", path.display())),
         Err(error) => {
-            Err(format!("the spectrum {name:?} is not known by name, and {} cannot be read: {error}", path.display()))
+            Err(format!("the spectrum {name:?} is not known by name, and {} {error}", path.display()))
         }
     }
 }

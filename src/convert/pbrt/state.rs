@@ -1,6 +1,6 @@
 //! What directives act on: the current transform, material and so on, and the stack of them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use glam::DAffine3;
@@ -18,6 +18,8 @@ pub struct State {
     pub now: Graphics,
     /// Saved by `AttributeBegin`, `TransformBegin` and `ObjectBegin`.
     pub saved: Vec<(Saved, Graphics)>,
+    /// Names of objects.
+    pub objects: HashSet<String>,
     /// `CoordinateSystem`.
     pub systems: HashMap<String, DAffine3>,
     /// Index into [`World::objects`] between `ObjectBegin` and `ObjectEnd`.
@@ -66,7 +68,7 @@ impl State {
             attributes: Vec::new(),
         };
         let world = World { start: Some(start), ..World::default() };
-        State { world, now, saved: Vec::new(), systems: HashMap::new(), object: None, is_in_world: false }
+        State { world, now, saved: Vec::new(), objects: HashSet::new(), systems: HashMap::new(), object: None, is_in_world: false }
     }
 
     /// The world, at the end of the file.

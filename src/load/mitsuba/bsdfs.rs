@@ -25,6 +25,8 @@ pub struct Library<'a> {
     /// Appearances in use, in the order of first use.
     pub appearances: Vec<Appearance>,
     read: HashMap<*const Element, Reading>,
+    /// How many are being read, each inside of the one before or referred to by it.
+    depth: usize,
     listed: HashMap<*const Element, Sides>,
     defaults: HashMap<Bare, Sides>,
 }
@@ -84,6 +86,9 @@ fn diffuse(reflectance: f32) -> Material {
     Material::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) })
 }
 
+/// Deepest nesting, by elements or by references. Keeps hostile files from exhausting the stack.
+const MAX_NESTING: usize = 64;
+
 /// Names of those that are made of others.
 const COMPOSITES: [&str; 5] = ["blendbsdf", "bumpmap", "mask", "normalmap", "twosided"];
 
@@ -96,6 +101,7 @@ impl<'a> Library<'a> {
             faults,
             appearances: Vec::new(),
             read: HashMap::new(),
+            depth: 0,
             listed: HashMap::new(),
             defaults: HashMap::new(),
         }
@@ -154,7 +160,12 @@ impl<'a> Library<'a> {
             }
             None => {}
         }
+        if self.depth == MAX_NESTING {
+            self.faults.at(&user.span, format!("bsdfs are inside one another deeper than {MAX_NESTING} levels"));
+            return None;
+        }
         self.read.insert(key, Reading::Begun);
+        self.depth += 1;
         let bsdf = match element.value("type") {
             "blendbsdf" => self.blend(element),
             "bumpmap" => self.relief(element, true),
@@ -163,6 +174,7 @@ impl<'a> Library<'a> {
             "twosided" => self.twosided(element),
             _ => self.simple(element).map(Bsdf::One),
         };
+        self.depth -= 1;
         self.read.insert(key, Reading::Done(bsdf.clone()));
         bsdf
     }

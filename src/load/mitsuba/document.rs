@@ -1,8 +1,9 @@
 //! XML text to a tree of elements with positions, defaults applied and attributes checked.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-use crate::load::faults::{Faults, Span, did_you_mean, list};
+use crate::load::faults::{Faults, Span, list};
+use crate::load::names::{Names, Replaced};
 
 /// An element, its `$names` replaced and its attributes known to be those that its tag has.
 #[derive(Debug)]
@@ -22,6 +23,8 @@ pub struct Attribute {
     name: &'static str,
     /// Its value.
     pub value: String,
+    /// Whether it stands in the file as it is, but for what `-D` says.
+    pub is_plain: bool,
     /// Where the value stands, without quotes.
     pub span: Span,
 }
@@ -141,10 +144,10 @@ pub fn read(text: &str, defines: &[(String, String)], faults: &Faults) -> Option
         faults.at(&tag_span(root), message);
         return None;
     }
-    let mut builder = Builder { names: Names::new(defines), faults };
+    let mut builder = Builder { names: Names::new(defines), defaults: BTreeSet::new(), faults };
     let scene = builder.element(root, 0)?;
     check_version(&scene, faults);
-    builder.names.report_unused(faults);
+    builder.names.unused().into_iter().for_each(|message| faults.general(message));
     Some(scene)
 }
 
@@ -171,6 +174,8 @@ fn check_version(scene: &Element, faults: &Faults) {
 /// Makes elements of nodes.
 struct Builder<'a> {
     names: Names<'a>,
+    /// Names that have a `<default>`.
+    defaults: BTreeSet<String>,
     faults: &'a Faults,
 }
 
@@ -207,8 +212,10 @@ impl Builder<'_> {
                 continue;
             };
             let span = given.range_value();
-            let value = self.names.replaced(given.value(), &span, self.faults);
-            attributes.push(Attribute { name, value, span });
+            let stands_there = node.document().input_text()[span.clone()] == *given.value();
+            let fault = |message| self.faults.without_value(&span, message);
+            let Replaced { text: value, by_default } = self.names.replaced(given.value(), fault);
+            attributes.push(Attribute { name, value, is_plain: stands_there && !by_default, span });
         }
         for name in tag.required.iter().filter(|name| !node.has_attribute(**name)) {
             self.faults.at(span, format!("<{}> needs the attribute {name}; {}", tag.name, list(&known)));
@@ -228,7 +235,7 @@ impl Builder<'_> {
             }
             let Some(element) = self.element(child, depth + 1) else { continue };
             match (tag.kind, element.kind()) {
-                (Kind::Scene, Kind::Default) => self.names.default(&element, self.faults),
+                (Kind::Scene, Kind::Default) => self.default(&element),
                 (_, Kind::Default) => self.faults.at(&element.span, "<default> belongs directly inside <scene>"),
                 (Kind::Transform, Kind::Step) => children.push(element),
                 (_, Kind::Step) => {
@@ -244,68 +251,21 @@ impl Builder<'_> {
         children
     }
 
+    /// A `<default>`, one for each name.
+    fn default(&mut self, element: &Element) {
+        let name = element.value("name");
+        if !self.defaults.insert(name.into()) {
+            self.faults.at(element.span_of("name"), format!("the default of {name:?} is given twice"));
+        }
+        self.names.default(name, element.value("value"));
+    }
+
     /// Text between elements means nothing, so it is a slip.
     fn expect_blank(&self, node: roxmltree::Node) {
         let text = node.text().unwrap_or_default();
         if !text.trim().is_empty() {
             let start = node.range().start + (text.len() - text.trim_start().len());
             self.faults.at(&(start..start + 1), "text between elements means nothing in a scene");
-        }
-    }
-}
-
-/// Values of `$names`.
-struct Names<'a> {
-    defines: &'a [(String, String)],
-    values: BTreeMap<String, String>,
-    defaults: BTreeSet<String>,
-    used: BTreeSet<String>,
-}
-
-impl<'a> Names<'a> {
-    fn new(defines: &'a [(String, String)]) -> Names<'a> {
-        let values = defines.iter().cloned().collect();
-        Names { defines, values, defaults: BTreeSet::new(), used: BTreeSet::new() }
-    }
-
-    /// A `<default>`: gives the value unless `-D` did.
-    fn default(&mut self, element: &Element, faults: &Faults) {
-        let name = element.value("name").to_string();
-        if !self.defaults.insert(name.clone()) {
-            faults.at(element.span_of("name"), format!("the default of {name:?} is given twice"));
-        }
-        self.values.entry(name).or_insert_with(|| element.value("value").into());
-    }
-
-    /// The text with every `$name` in it replaced by its value.
-    fn replaced(&mut self, text: &str, span: &Span, faults: &Faults) -> String {
-        let mut missing = Vec::new();
-        let mut parts = text.split('$');
-        let mut replaced = parts.next().unwrap_or_default().to_string();
-        for part in parts {
-            let end = part.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(part.len());
-            let (name, rest) = part.split_at(end);
-            match self.values.get(name) {
-                Some(value) => replaced.push_str(value),
-                None => missing.push(name),
-            }
-            self.used.insert(name.into());
-            replaced.push_str(rest);
-        }
-        if let Some(name) = missing.first() {
-            let known: Vec<_> = self.values.keys().map(String::as_str).collect();
-            let (near, known) = (did_you_mean(name, &known), list(&known));
-            let message = format!("${name} has no value: no <default> before this, no -D {name}=…{near}; {known}");
-            faults.without_value(span, message);
-        }
-        replaced
-    }
-
-    /// A `-D` that nothing refers to is a slip.
-    fn report_unused(&self, faults: &Faults) {
-        for (name, value) in self.defines.iter().filter(|(name, _)| !self.used.contains(name)) {
-            let known: Vec<_> = self.used.iter().map(String::as_str).collect();
-            faults.general(format!("-D {name}={value} has no effect: the scene uses no ${name}; {}", list(&known)));
         }
     }
 }

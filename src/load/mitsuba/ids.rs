@@ -36,6 +36,9 @@ impl<'a> Ids<'a> {
     /// The element of the expected tag that a `ref` names.
     pub fn referred(&self, reference: &Element, tag: &str, faults: &Faults) -> Option<&'a Element> {
         let id = reference.attribute("id")?;
+        if self.0.get(id.value.as_str()).is_none_or(|element| element.tag != tag) && faults.is_full() {
+            return None; // names that are known need not be listed once more
+        }
         let known = || {
             let known: Vec<_> = self.0.iter().filter(|(_, e)| e.tag == tag).map(|(id, _)| *id).collect();
             (super::did_you_mean(&id.value, &known), list(&known))

@@ -21,17 +21,18 @@ mod textures;
 mod transforms;
 mod values;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::faults::{Faults, did_you_mean};
-use super::{LoadError, Watch};
+use super::access::Access;
+use super::{LoadError, Reach, Watch};
 use crate::scene::SceneDescription;
 use crate::scene::lights::Light;
-use document::Element;
+use document::{Attribute, Element};
 use ids::Ids;
 use parameters::ElementParameters;
 use sensors::View;
-pub use shapes::parse_ply;
+pub use shapes::{mesh, parse_ply};
 use textures::Textures;
 
 /// Reads the text of the scene file at `path`.
@@ -39,17 +40,18 @@ pub fn read(
     path: &Path,
     text: String,
     defines: &[(String, String)],
+    reach: Reach,
     watch: &Watch,
 ) -> Result<SceneDescription, LoadError> {
     let faults = Faults::default();
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = Folder::new(path.parent().unwrap_or(Path::new("")), reach);
     let description =
-        document::read(&text, defines, &faults).and_then(|scene| describe(&scene, folder, watch, &faults));
+        document::read(&text, defines, &faults).and_then(|scene| describe(&scene, &folder, watch, &faults));
     faults.settle(path, text, description)
 }
 
 /// Reads the elements of the scene.
-fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> Option<SceneDescription> {
+fn describe(scene: &Element, folder: &Folder, watch: &Watch, faults: &Faults) -> Option<SceneDescription> {
     let ids = Ids::new(scene, faults);
     let textures = Textures::new(scene, &ids, folder, faults);
     let mut bsdfs = bsdfs::Library::new(&ids, &textures, faults);
@@ -94,6 +96,23 @@ fn describe(scene: &Element, folder: &Path, watch: &Watch, faults: &Faults) -> O
         lights,
         warnings,
     })
+}
+
+/// Where the scene's files are.
+pub struct Folder {
+    path: PathBuf,
+    access: Access,
+}
+
+impl Folder {
+    fn new(path: &Path, reach: Reach) -> Folder {
+        Folder { path: path.to_owned(), access: Access::new(path, reach) }
+    }
+
+    /// The file that an attribute names, or in a sentence why it is not read.
+    pub fn file(&self, name: &Attribute) -> Result<PathBuf, String> {
+        self.access.file(&self.path, &name.value, name.is_plain)
+    }
 }
 
 /// Whether an element is an emitter.

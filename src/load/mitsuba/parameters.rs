@@ -1,10 +1,12 @@
 //! The named parameters and nested objects of one element.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{Affine2, Affine3A, Mat2, Vec3};
 
+use super::Folder;
 use super::document::{Element, Kind};
 use super::textures::Textures;
 use super::{transforms, values};
@@ -122,6 +124,13 @@ impl<'a> ElementParameters<'a> {
             self.faults.at(&self.element.span, format!("{} needs the parameter {name:?}", self.element.described()));
         }
         value
+    }
+
+    /// The file that the string of that name, without which the element means nothing, names.
+    pub fn file(&mut self, name: &str, folder: &Folder) -> Option<PathBuf> {
+        self.required_string(name)?;
+        let named = self.child(name)?.attribute("value")?;
+        folder.file(named).map_err(|message| self.faults.at(&named.span, message)).ok()
     }
 
     /// Reports parameters and objects that nothing asked for, and those given twice.
@@ -260,8 +269,8 @@ impl Parameters for ElementParameters<'_> {
     }
 
     fn image(&mut self, name: &str) -> Option<Arc<Image>> {
-        let file = self.required_string(name)?;
         let textures = self.textures.expect("elements that name pictures are read with them");
+        let file = self.file(name, textures.folder)?;
         textures.image(&file).map_err(|message| Parameters::fault(self, name, message)).ok()
     }
 

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::Folder;
 use super::document::{Element, Kind};
 use super::ids::Ids;
 use super::parameters::ElementParameters;
@@ -16,14 +17,15 @@ use crate::scene::textures::{self, Image, Texture};
 pub struct Textures<'a> {
     ids: &'a Ids<'a>,
     faults: &'a Faults,
-    folder: &'a Path,
+    /// Where pictures are.
+    pub folder: &'a Folder,
     images: Images,
     read: RefCell<HashMap<*const Element, Option<Arc<Texture>>>>,
 }
 
 impl<'a> Textures<'a> {
     /// Of a scene file in that folder; reads the pictures that it names, in parallel.
-    pub fn new(scene: &'a Element, ids: &'a Ids<'a>, folder: &'a Path, faults: &'a Faults) -> Self {
+    pub fn new(scene: &'a Element, ids: &'a Ids<'a>, folder: &'a Folder, faults: &'a Faults) -> Self {
         let mut paths = Vec::new();
         gather(scene, folder, &mut paths);
         paths.sort();
@@ -58,9 +60,9 @@ impl<'a> Textures<'a> {
         texture
     }
 
-    /// The picture in a file beside the scene file, or in a sentence why there is none.
-    pub fn image(&self, name: &str) -> Result<Arc<Image>, String> {
-        self.images.get(&self.folder.join(name))
+    /// The picture in a file, or in a sentence why there is none.
+    pub fn image(&self, path: &Path) -> Result<Arc<Image>, String> {
+        self.images.get(path)
     }
 
     /// Whether an element is a texture or refers to one.
@@ -73,11 +75,11 @@ impl<'a> Textures<'a> {
 }
 
 /// The picture files that an element and all in it name.
-fn gather(element: &Element, folder: &Path, paths: &mut Vec<PathBuf>) {
+fn gather(element: &Element, folder: &Folder, paths: &mut Vec<PathBuf>) {
     let is_picture = matches!((element.tag, element.value("type")), ("texture", "bitmap") | ("emitter", "envmap"));
     let names = element.children.iter().filter(|child| is_picture && child.tag == "string");
-    paths
-        .extend(names.filter(|child| child.value("name") == "filename").map(|child| folder.join(child.value("value"))));
+    let names = names.filter(|child| child.value("name") == "filename").filter_map(|child| child.attribute("value"));
+    paths.extend(names.filter_map(|name| folder.file(name).ok())); // those that are not read are faults later
     for child in &element.children {
         gather(child, folder, paths);
     }

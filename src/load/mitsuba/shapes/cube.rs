@@ -1,9 +1,8 @@
 //! `cube`: [−1, 1]³ with its front outside; `to_world`, `flip_normals`, `face_normals`.
 
-use std::path::Path;
-
 use glam::{Vec2, Vec3};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::Build;
 use super::mesh::{Placement, RawMesh};
@@ -20,7 +19,7 @@ const FACES: [(Vec3, Vec3); 6] = [
 ];
 
 /// Reads the cube.
-pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, _folder: &Folder) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let face_normals = p.boolean("face_normals").unwrap_or(false);
     let placement = Placement { to_world: p.to_world(), flip_normals, smooth: false };

@@ -1,9 +1,8 @@
 //! `cylinder`: `p0`, `p1`, `radius`, `to_world`, `flip_normals`; its front is outside, its ends are open.
 
-use std::path::Path;
-
 use glam::{Mat3, Vec3};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::Build;
 use crate::math::Frame;
@@ -14,7 +13,7 @@ use crate::scene::parameters::Parameters;
 const CIRCLE_TOLERANCE: f32 = 1e-3;
 
 /// Reads the cylinder.
-pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, _folder: &Folder) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let p0 = p.point("p0").unwrap_or(Vec3::ZERO);
     let p1 = p.point("p1").unwrap_or(Vec3::Z);

@@ -1,9 +1,8 @@
 //! `disk`: radius 1 around the origin with its front towards +z; `to_world`, `flip_normals`.
 
-use std::path::Path;
-
 use glam::{Mat3, Vec3};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::Build;
 use crate::scene::description::ShapeGeometry;
@@ -13,7 +12,7 @@ use crate::scene::parameters::Parameters;
 const CIRCLE_TOLERANCE: f32 = 1e-3;
 
 /// Reads the disk.
-pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, _folder: &Folder) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let to_world = p.to_world();
     let [x, y] = [Vec3::X, Vec3::Y].map(|axis| to_world.transform_vector3(axis));

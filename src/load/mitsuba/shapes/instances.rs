@@ -3,7 +3,7 @@
 //!
 //! As in Mitsuba, shapes of a group do not emit, and a group holds no instances.
 
-use std::collections::BTreeSet;
+use std::collections::HashMap;
 
 use glam::Affine3A;
 
@@ -32,19 +32,17 @@ pub struct Layout<'a> {
 /// Reads all instances among a scene's shapes.
 pub fn layout<'a>(elements: &[&'a Element], ids: &Ids<'a>, faults: &'a Faults) -> Layout<'a> {
     let mut layout = Layout { groups: Vec::new(), instances: Vec::new(), warnings: Vec::new() };
-    let mut used = BTreeSet::new();
+    let mut known: HashMap<usize, usize> = HashMap::new(); // indices of groups, by where they stand
     for element in elements.iter().filter(|element| element.value("type") == INSTANCE) {
         let Some((group, to_world)) = instance(element, ids, faults) else { continue };
-        let known = layout.groups.iter().position(|known| std::ptr::eq(*known, group));
-        let index = known.unwrap_or_else(|| {
+        let index = *known.entry(group.span.start).or_insert_with(|| {
             layout.groups.push(group);
             layout.groups.len() - 1
         });
-        used.insert(group.span.start);
         layout.instances.push(InstanceDescription { group: index, to_world });
     }
     for element in elements.iter().filter(|element| element.value("type") == GROUP) {
-        if !used.contains(&element.span.start) {
+        if !known.contains_key(&element.span.start) {
             let name = element.attribute("id").map_or("without an id".to_owned(), |id| format!("{:?}", id.value));
             layout.warnings.push(format!("the shapegroup {name} is placed by no instance and left out"));
             members(element, faults); // it may have faults as well

@@ -14,10 +14,13 @@ mod rectangle;
 mod serialized;
 mod sphere;
 
-use std::path::{Path, PathBuf};
+use std::io::Cursor;
+use std::path::Path;
 
+use glam::Affine3A;
 use rayon::prelude::*;
 
+use super::Folder;
 use super::bsdfs::{Bare, Library};
 use super::document::Element;
 use super::emitters;
@@ -28,6 +31,7 @@ use super::textures::Textures;
 use crate::load::Watch;
 use crate::load::faults::{Faults, Span};
 use crate::load::watch::{self, Source};
+use crate::scene::Mesh;
 use crate::scene::description::{GroupDescription, InstanceDescription, ShapeDescription, ShapeGeometry, Sides};
 use crate::scene::parameters::Parameters;
 use crate::scene::textures::Varying;
@@ -40,7 +44,7 @@ pub use ply::parse_bytes as parse_ply;
 #[derive(Clone, Copy)]
 enum Plugin {
     /// A surface, and what reads it.
-    Surface(fn(&mut ElementParameters, &Path) -> Option<Build>),
+    Surface(fn(&mut ElementParameters, &Folder) -> Option<Build>),
     /// Not a surface but surfaces elsewhere: see [`instances`].
     Layout,
 }
@@ -125,7 +129,7 @@ pub struct Shapes {
 /// Reads all shapes. `None` where one is faulty.
 pub fn read<'a>(
     elements: &[&'a Element],
-    folder: &Path,
+    folder: &Folder,
     ids: &Ids<'a>,
     bsdfs: &mut Library<'a>,
     textures: &'a Textures<'a>,
@@ -153,7 +157,7 @@ pub fn read<'a>(
 /// The surfaces among some elements; `None` for each that is faulty.
 fn pending_all<'a>(
     elements: &[&'a Element],
-    folder: &Path,
+    folder: &Folder,
     bsdfs: &mut Library<'a>,
     textures: &'a Textures<'a>,
     faults: &'a Faults,
@@ -197,7 +201,7 @@ fn build_all(
 fn pending<'a>(
     index: usize,
     element: &'a Element,
-    folder: &Path,
+    folder: &Folder,
     bsdfs: &mut Library<'a>,
     textures: &'a Textures<'a>,
     faults: &'a Faults,
@@ -235,20 +239,27 @@ fn pending<'a>(
     Some(Pending { name, span, parts, build: build?? })
 }
 
-/// The mesh file that `filename` names, beside the scene file.
-fn file(p: &mut ElementParameters, folder: &Path) -> Option<PathBuf> {
-    p.required_string("filename").map(|name| folder.join(name))
+/// The mesh in the content of a file, in its own coordinates.
+pub fn mesh(kind: &str, content: &[u8]) -> Result<Mesh, String> {
+    let raw = match kind {
+        "obj" => obj::parse(&mut &content[..]),
+        "ply" => parse_ply(content),
+        "serialized" => serialized::parse(&mut Cursor::new(content), 0),
+        _ => return Err(format!("no mesh file is {kind:?}; known: obj, ply, serialized")),
+    };
+    let placement = Placement { to_world: Affine3A::IDENTITY, flip_normals: false, smooth: true };
+    raw?.place(placement).map(|(mesh, _)| mesh)
 }
 
 /// A shape whose mesh a file holds: reads the parameters that all such shapes have; the file is read, by `parse`, by
 /// what this returns. `flip_tex_coords` is what the format does by default, if it lets that be chosen.
 fn mesh_file(
     p: &mut ElementParameters,
-    folder: &Path,
+    folder: &Folder,
     flip_tex_coords: Option<bool>,
     parse: impl FnOnce(&mut Source) -> Result<RawMesh, String> + Send + 'static,
 ) -> Option<Build> {
-    let path = file(p, folder);
+    let path = p.file("filename", folder);
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let face_normals = p.boolean("face_normals").unwrap_or(false);
     let flip_tex_coords = flip_tex_coords.is_some_and(|by_default| p.boolean("flip_tex_coords").unwrap_or(by_default));

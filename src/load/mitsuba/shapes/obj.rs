@@ -14,11 +14,11 @@ mod corners;
 mod piece;
 
 use std::io::{self, BufRead, Read};
-use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::mesh::RawMesh;
 use super::{Build, mesh_file};
@@ -26,7 +26,7 @@ use corners::{Corner, Corners};
 use piece::{Numbers, Piece, Said};
 
 /// Reads the element; the file is read by what it returns.
-pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, folder: &Folder) -> Option<Build> {
     mesh_file(p, folder, Some(true), |source| parse(source))
 }
 
@@ -36,7 +36,7 @@ const PIECE: usize = 1 << 15;
 const PIECES_A_THREAD: usize = 4;
 
 /// The text of a file as one mesh.
-fn parse(source: &mut impl BufRead) -> Result<RawMesh, String> {
+pub fn parse(source: &mut impl BufRead) -> Result<RawMesh, String> {
     parse_in_pieces(source, PIECE)
 }
 

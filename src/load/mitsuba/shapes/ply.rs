@@ -12,19 +12,19 @@
 mod values;
 
 use std::io::BufRead;
-use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, PropertyDef, PropertyType, ScalarType};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::mesh::RawMesh;
 use super::{Build, mesh_file};
 use values::Values;
 
 /// Reads the element; the file is read by what it returns.
-pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, folder: &Folder) -> Option<Build> {
     mesh_file(p, folder, Some(false), |source| {
         let size = source.get_ref().size().unwrap_or(0);
         parse(source, size)

@@ -1,16 +1,15 @@
 //! `rectangle`: the square [−1, 1]² with its front towards +z; `to_world`, `flip_normals`.
 
-use std::path::Path;
-
 use glam::{Vec2, Vec3};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::Build;
 use super::mesh::{Placement, RawMesh};
 use crate::scene::parameters::Parameters;
 
 /// Reads the rectangle.
-pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, _folder: &Folder) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let placement = Placement { to_world: p.to_world(), flip_normals, smooth: false };
     Some(Build::new(move || {

@@ -9,12 +9,12 @@
 //! that faces are flat. What is compressed can only be read from its beginning, so one thread does.
 //! Source: the manual of Mitsuba 0.6, section 8.2.3.
 
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
 use flate2::bufread::ZlibDecoder;
 use glam::{DVec2, DVec3};
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::mesh::RawMesh;
 use super::{Build, mesh_file};
@@ -36,7 +36,7 @@ mod flag {
 }
 
 /// Reads the element; the file is read by what it returns.
-pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, folder: &Folder) -> Option<Build> {
     let index = p.integer("shape_index").unwrap_or(0);
     if index < 0 {
         p.fault("shape_index", format!("shape_index is {index}; the first mesh of a file is 0"));
@@ -45,15 +45,41 @@ pub fn read(p: &mut ElementParameters, folder: &Path) -> Option<Build> {
 }
 
 /// The mesh of that number in a file.
-fn parse(source: &mut (impl BufRead + Seek), index: u64) -> Result<RawMesh, String> {
+pub fn parse(source: &mut (impl BufRead + Seek), index: u64) -> Result<RawMesh, String> {
     let version = header(source)?;
     if index > 0 {
         let place = place(source, version, index)?;
         source.seek(SeekFrom::Start(place)).map_err(|error| error.to_string())?;
         header(source)?;
     }
+    let at = source.stream_position().map_err(|error| error.to_string())?;
+    let packed = source.seek(SeekFrom::End(0)).map_err(|error| error.to_string())? - at;
+    source.seek(SeekFrom::Start(at)).map_err(|error| error.to_string())?;
+    let left = LEAST_UNPACKED.max(MOST_UNPACKED.saturating_mul(packed));
     // many small reads: a second buffer, behind the decoder
-    mesh(&mut BufReader::new(ZlibDecoder::new(source)), version)
+    mesh(&mut BufReader::new(Bounded { source: ZlibDecoder::new(source), left }), version)
+}
+
+/// Most bytes that one of the file may unpack to. zlib itself can make a thousand of it, of zeros; meshes have numbers
+/// that differ, and come to less than ten.
+const MOST_UNPACKED: u64 = 256;
+/// Bytes that any file may unpack to.
+const LEAST_UNPACKED: u64 = 1 << 20;
+
+/// A source of which no more than so many bytes are read.
+struct Bounded<R> {
+    source: R,
+    left: u64,
+}
+
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.left = self.left.checked_sub(count as u64).ok_or_else(|| {
+            io::Error::other(format!("it unpacks to more than {MOST_UNPACKED} times its size, which no mesh does"))
+        })?;
+        Ok(count)
+    }
 }
 
 /// The version of the mesh that begins here.

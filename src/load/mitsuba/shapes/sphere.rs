@@ -1,16 +1,15 @@
 //! `sphere`: `center`, `radius`, `to_world`, `flip_normals`; its front is outside.
 
-use std::path::Path;
-
 use glam::Vec3;
 
+use super::super::Folder;
 use super::super::parameters::ElementParameters;
 use super::Build;
 use crate::scene::description::ShapeGeometry;
 use crate::scene::parameters::{Parameters, similarity};
 
 /// Reads the sphere.
-pub fn read(p: &mut ElementParameters, _folder: &Path) -> Option<Build> {
+pub fn read(p: &mut ElementParameters, _folder: &Folder) -> Option<Build> {
     let flip_normals = p.boolean("flip_normals").unwrap_or(false);
     let center = p.point("center").unwrap_or(Vec3::ZERO);
     let radius = p.float("radius").unwrap_or(1.0);

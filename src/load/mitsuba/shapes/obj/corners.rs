@@ -3,6 +3,8 @@
 //! Most files need nothing of the kind: they have positions only, or number everything alike. As long as that is so, a
 //! vertex is what has its number, and no table is kept. The first corner that is different makes one.
 
+use std::collections::HashMap;
+
 use glam::{Vec2, Vec3};
 
 use super::super::mesh::RawMesh;
@@ -35,7 +37,13 @@ pub struct Table {
     first: Vec<u32>,
     /// By vertex: the next one with the same position.
     next: Vec<u32>,
+    /// Vertices of positions that have [`LONG`] others already, by their numbers.
+    far: HashMap<[u32; 3], u32>,
 }
+
+/// Vertices with the same position that are looked at one after the other. A fan around a point has a few; a file that gives
+/// all corners the same position would take the square of their number.
+const LONG: usize = 32;
 
 /// No number.
 const NONE: u32 = u32::MAX;
@@ -90,6 +98,7 @@ impl Table {
             vertices: numbers.clone().map(|i| [i, has(uvs, i), has(normals, i)]).collect(),
             first: numbers.collect(),
             next: vec![NONE; positions],
+            far: HashMap::new(),
         }
     }
 
@@ -99,7 +108,7 @@ impl Table {
         if position >= self.first.len() {
             self.first.resize(position + 1, NONE);
         }
-        let mut last = None;
+        let (mut last, mut length) = (None, 0);
         let mut vertex = self.first[position];
         while vertex != NONE {
             if self.vertices[vertex as usize] == key {
@@ -107,19 +116,29 @@ impl Table {
             }
             last = Some(vertex as usize);
             vertex = self.next[vertex as usize];
+            length += 1;
+        }
+        if length == LONG
+            && let Some(vertex) = self.far.get(&key)
+        {
+            return Ok(*vertex);
         }
         let new = u32::try_from(self.vertices.len()).ok().filter(|new| *new < NONE);
         let new = new.ok_or("the file makes more than 2³² vertices")?;
         self.vertices.push(key);
         self.next.push(NONE);
-        *last.map_or(&mut self.first[position], |last| &mut self.next[last]) = new;
+        if length == LONG {
+            self.far.insert(key, new);
+        } else {
+            *last.map_or(&mut self.first[position], |last| &mut self.next[last]) = new;
+        }
         Ok(new)
     }
 
     /// Gives each vertex what it refers to; one array after the other, so that few are there at once.
     fn finish(self, raw: &mut RawMesh, normals: Vec<Vec3>, uvs: Vec<Vec2>) {
-        let Table { vertices, first, next } = self;
-        drop((first, next));
+        let Table { vertices, first, next, far } = self;
+        drop((first, next, far));
         let has = |part: usize| vertices.iter().any(|vertex| vertex[part] != NONE);
         raw.positions = vertices.iter().map(|vertex| raw.positions[vertex[0] as usize]).collect();
         // a number beyond the array is that of a position without a face, from when all were alike
