@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::run_options::RunOptions;
-use super::scene::{Opened, SceneArguments};
+use super::scene::{Opened, SceneArguments, number_of_threads};
 use super::{signals, values};
 use crate::film::file::{check_writable, write_somewhere};
 use crate::render::log::{self, Log};
@@ -113,6 +113,10 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
         return Err(Failure::input(fault));
     }
+    let threads = number_of_threads(settings.threads);
+    if let Some(fault) = memory::space_left().and_then(|left| memory.fault_of_space(threads, left)) {
+        return Err(Failure::input(fault));
+    }
     let is_kept = keep.is_some() || resumed.is_some();
     let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
     resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
@@ -153,7 +157,8 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     } else {
         (outputs, failures) = output.write_somewhere(&outcome.picture);
         if let (Some(kept), true) = (&kept, outputs.is_empty()) {
-            failures.push(format!("the picture is made again, and nothing else, by --resume {} -o FILE", kept.display()));
+            failures
+                .push(format!("the picture is made again, and nothing else, by --resume {} -o FILE", kept.display()));
         }
     }
     if let Some(agreement) = &outcome.agreement {

@@ -28,6 +28,12 @@ const BYTES_OF_PICTURE: u64 = 2 * (12 + 4);
 /// Replicas where their number is free, at most two of which have layers of their own.
 const REPLICAS: usize = 2;
 
+/// Address space of a thread: a stack of 2 MiB, and an arena of the allocator of 64 MiB, for which glibc asks for 128 MiB
+/// to find an aligned half. Very little of it is ever touched.
+const SPACE_OF_A_THREAD: u64 = (2 + 128) << 20;
+/// Address space that Embree and TBB take for their code and data (180 MiB of Embree 4.4), and what chains and tables may.
+const SPACE_OF_EMBREE: u64 = 256 << 20;
+
 impl FilmMemory {
     /// Of a run with those settings; of the mapping that takes most where a trial chooses it.
     pub fn of(film: &FilmDescription, settings: &Settings) -> FilmMemory {
@@ -69,6 +75,23 @@ impl FilmMemory {
         )
     }
 
+    /// Why a run on so many threads cannot be had where only so much address space is left to be had; none if it can.
+    pub fn fault_of_space(&self, threads: usize, left: u64) -> Option<String> {
+        let of_threads = threads as u64 * SPACE_OF_A_THREAD;
+        let all = self.most + of_threads + SPACE_OF_EMBREE;
+        (all > left).then(|| {
+            format!(
+                "memory is short: the run takes up to {} of address space ({} for the film, {} for Embree and tables, {} for \
+                 {threads} threads), and {} are left of its limit (ulimit -v); raise that, or use fewer --threads",
+                gigabytes(all),
+                gigabytes(self.most),
+                gigabytes(SPACE_OF_EMBREE),
+                gigabytes(of_threads),
+                gigabytes(left)
+            )
+        })
+    }
+
     /// Why the film cannot be had where only so much memory is to be had; none if it can.
     pub fn fault(&self, available: u64) -> Option<String> {
         (self.most > available).then(|| {
@@ -99,9 +122,28 @@ pub fn available() -> Option<u64> {
     }
 }
 
+/// Address space that this process may still ask for under the limit that it has (`ulimit -v`). `None` where it has none, or
+/// where it is not told.
+pub fn space_left() -> Option<u64> {
+    let of = |file: &str| fs::read_to_string(format!("/proc/self/{file}")).ok();
+    of_limits(&of("limits")?, &of("status")?)
+}
+
+/// What the limit of Linux leaves.
+fn of_limits(limits: &str, status: &str) -> Option<u64> {
+    let limit = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit: u64 = limit.split_whitespace().next()?.parse().ok()?; // not a number: `unlimited`
+    Some(limit.saturating_sub(kibibytes(status, "VmSize:")?))
+}
+
 /// `MemAvailable` of Linux, which counts what caches would give back.
 fn of_meminfo(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    kibibytes(text, "MemAvailable:")
+}
+
+/// Bytes of a line such as `VmSize:   5 kB`.
+fn kibibytes(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -147,5 +189,18 @@ mod tests {
         assert_eq!(of_meminfo(text), Some(22_000_000 * 1024));
         assert_eq!(of_meminfo("MemTotal: 5 kB\n"), None);
         assert_eq!(of_meminfo("MemAvailable: lots kB\n"), None);
+        let limits = "Max cpu time unlimited unlimited seconds\nMax address space     5000000     unlimited    bytes\n";
+        assert_eq!(of_limits(limits, "VmPeak: 9 kB\nVmSize:     1000 kB\n"), Some(5_000_000 - 1_024_000));
+        assert_eq!(of_limits(limits, "VmSize: 9000 kB\n"), Some(0));
+        assert_eq!(of_limits("Max address space  unlimited  unlimited  bytes\n", "VmSize: 1 kB\n"), None);
+    }
+
+    #[test]
+    fn limits_of_address_space_are_known_to_be_too_narrow() {
+        let memory = FilmMemory::of(&FilmDescription::new(1000, 1000, Filter::Box), &Settings::default());
+        let needed = memory.most + 2 * SPACE_OF_A_THREAD + SPACE_OF_EMBREE;
+        assert!(memory.fault_of_space(2, needed).is_none());
+        let fault = memory.fault_of_space(2, needed - 1).unwrap();
+        assert!(fault.contains("0.3 GB for 2 threads") && fault.contains("ulimit -v"), "{fault}");
     }
 }
