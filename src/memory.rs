@@ -20,9 +20,28 @@ pub fn available() -> Option<u64> {
     }
 }
 
+/// Address space that this process may still ask for under the limit that it has (`ulimit -v`). `None` where it has none, or
+/// where it is not told.
+pub fn space_left() -> Option<u64> {
+    let of = |file: &str| fs::read_to_string(format!("/proc/self/{file}")).ok();
+    of_limits(&of("limits")?, &of("status")?)
+}
+
+/// What the limit of Linux leaves.
+fn of_limits(limits: &str, status: &str) -> Option<u64> {
+    let limit = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit: u64 = limit.split_whitespace().next()?.parse().ok()?; // not a number: `unlimited`
+    Some(limit.saturating_sub(kibibytes(status, "VmSize:")?))
+}
+
 /// `MemAvailable` of Linux, which counts what caches would give back.
 fn of_meminfo(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    kibibytes(text, "MemAvailable:")
+}
+
+/// Bytes of a line such as `VmSize:   5 kB`.
+fn kibibytes(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -52,6 +71,10 @@ mod tests {
         assert_eq!(of_meminfo(text), Some(22_000_000 * 1024));
         assert_eq!(of_meminfo("MemTotal: 5 kB\n"), None);
         assert_eq!(of_meminfo("MemAvailable: lots kB\n"), None);
+        let limits = "Max cpu time unlimited unlimited seconds\nMax address space     5000000     unlimited    bytes\n";
+        assert_eq!(of_limits(limits, "VmPeak: 9 kB\nVmSize:     1000 kB\n"), Some(5_000_000 - 1_024_000));
+        assert_eq!(of_limits(limits, "VmSize: 9000 kB\n"), Some(0));
+        assert_eq!(of_limits("Max address space  unlimited  unlimited  bytes\n", "VmSize: 1 kB\n"), None);
     }
 
     #[test]

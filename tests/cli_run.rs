@@ -6,6 +6,10 @@ use std::time::{Duration, Instant};
 
 use relt::film::{Plane, Value, exr_file};
 
+#[cfg(target_os = "linux")]
+#[path = "cli_run/short.rs"]
+mod short;
+
 const CORNELL_BOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box/scene.xml");
 
 /// `relt render` on the Cornell box at 32 × 32 pixels.

@@ -12,8 +12,8 @@ pub(super) enum Failure {
     Input(Vec<String>),
     /// The same with a text that needs no `error:` before it, such as a marked-up piece of a scene file; code 2.
     Shown(String),
-    /// It failed on the way; code 1.
-    Running(String),
+    /// It failed on the way, for these reasons; code 1.
+    Running(Vec<String>),
     /// All was done, but what came of it is beyond these limits that were set; code 3.
     Exceeded(Vec<String>),
     /// A signal ended it with less than was asked for, which is written and can be gone on with; code 130.
@@ -28,7 +28,7 @@ impl Failure {
 
     /// A failure on the way.
     pub fn running(reason: impl fmt::Display) -> Failure {
-        Failure::Running(reason.to_string())
+        Failure::Running(vec![reason.to_string()])
     }
 
     /// A fault of an input file, shown in place; colours and frames only where standard error is a terminal.
@@ -49,11 +49,10 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Failure::Input(reasons) | Failure::Exceeded(reasons) => {
+            Failure::Input(reasons) | Failure::Running(reasons) | Failure::Exceeded(reasons) => {
                 reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}"))
             }
             Failure::Shown(text) => f.write_str(text),
-            Failure::Running(reason) => writeln!(f, "error: {reason}"),
             Failure::Interrupted(reason) => writeln!(f, "stopped: {reason}"),
         }
     }

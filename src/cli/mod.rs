@@ -67,6 +67,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(message.exit_code() as u8);
         }
     };
+    signals::survive_limits_of_files();
     let done = match arguments.command {
         Command::Render(arguments) => render::run(*arguments),
         Command::Merge(arguments) => merge::run(arguments),

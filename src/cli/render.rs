@@ -10,9 +10,9 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::run_options::RunOptions;
-use super::scene::{Opened, SceneArguments};
+use super::scene::{Opened, SceneArguments, number_of_threads};
 use super::{signals, values};
-use crate::film::file::{FileError, check_writable};
+use crate::film::file::{check_writable, write_somewhere};
 use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Verbosity};
@@ -113,6 +113,10 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
         return Err(Failure::input(fault));
     }
+    let threads = number_of_threads(settings.threads);
+    if let Some(fault) = memory::space_left().and_then(|left| memory.fault_of_space(threads, left)) {
+        return Err(Failure::input(fault));
+    }
     let is_kept = keep.is_some() || resumed.is_some();
     let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
     resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
@@ -146,19 +150,22 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
         outcome.warnings.push(format!("the first of those paths: {command}"));
     }
 
-    let mut outputs = Vec::new();
-    if !is_part {
-        output.write(&outcome.picture).map_err(Failure::running)?;
-        outputs = output.files();
-    }
+    let (mut outputs, mut failures) = (Vec::new(), Vec::new());
     let kept = audience.keeper.as_ref().and_then(Keeper::written);
-    if is_part && kept.is_none() {
-        return Err(Failure::running("the part could not be written"));
+    if is_part {
+        failures.extend(audience.keeper.as_ref().and_then(Keeper::failure));
+    } else {
+        (outputs, failures) = output.write_somewhere(&outcome.picture);
+        if let (Some(kept), true) = (&kept, outputs.is_empty()) {
+            failures
+                .push(format!("the picture is made again, and nothing else, by --resume {} -o FILE", kept.display()));
+        }
     }
     if let Some(agreement) = &outcome.agreement {
         audience.progress.say(&agreement.in_words());
     }
-    let failure = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
+    let untrusted = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
+    let failure = if failures.is_empty() { untrusted } else { Some(Failure::Running(failures)) };
     audience.finished(&Summary {
         status: outcome.status,
         health: outcome.health,
@@ -366,40 +373,56 @@ struct Keeper {
     interval: Option<Interval>,
     /// A signal asks for one.
     asked: Arc<AtomicBool>,
-    /// The last one could be written.
-    written: AtomicBool,
+    /// Where the last one is, if it could be written.
+    written: Mutex<Option<PathBuf>>,
+    /// Why it is not where it should be.
+    failure: Mutex<Option<String>>,
 }
 
 impl Keeper {
     fn new(path: PathBuf, asked: Arc<AtomicBool>, interval: Option<Duration>, begin: Duration) -> Keeper {
         let interval = interval.map(|interval| Interval::from(begin, interval));
-        Keeper { path, interval, asked, written: AtomicBool::new(false) }
+        Keeper { path, interval, asked, written: Mutex::default(), failure: Mutex::default() }
     }
 
     fn is_due(&self, elapsed: Duration) -> bool {
         self.asked.load(Relaxed) || self.interval.as_ref().is_some_and(|interval| interval.is_due(elapsed))
     }
 
-    /// The file, if it is there.
+    /// Where the last one is, if it could be written.
     fn written(&self) -> Option<PathBuf> {
-        self.written.load(Relaxed).then(|| self.path.clone())
+        self.written.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Writes a checkpoint, or tells why not: the disk may have room again at the next. Returns whether a signal asked for
-    /// it.
-    fn write(&self, checkpoint: &Checkpoint) -> (bool, Result<(), FileError>) {
+    /// Why the last one is not where it should be.
+    fn failure(&self) -> Option<String> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Writes a checkpoint, or tells why not: the disk may have room again at the next, but the `last` one is put somewhere
+    /// else then. Returns whether a signal asked for it.
+    fn write(&self, checkpoint: &Checkpoint, last: bool) -> (bool, Result<(), String>) {
         let asked = self.asked.swap(false, Relaxed);
-        let written = checkpoint.write(&self.path);
-        self.written.store(written.is_ok(), Relaxed);
-        (asked, written)
+        let (written, result) = if last {
+            match write_somewhere(&self.path, |path| checkpoint.write(path)) {
+                Ok(()) => (Some(self.path.clone()), Ok(())),
+                Err(misplaced) => (misplaced.instead.as_ref().ok().cloned(), Err(misplaced.to_string())),
+            }
+        } else {
+            let result = checkpoint.write(&self.path).map_err(|error| error.to_string());
+            (result.is_ok().then(|| self.path.clone()), result)
+        };
+        *self.written.lock().unwrap_or_else(PoisonError::into_inner) = written;
+        *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = result.as_ref().err().cloned();
+        (asked, result)
     }
 }
 
 impl Audience<'_> {
-    fn keep(&self, checkpoint: &Checkpoint) {
+    fn keep(&self, checkpoint: &Checkpoint, last: bool) {
         let Some(keeper) = &self.keeper else { return };
         let begin = Instant::now();
-        let (asked, written) = keeper.write(checkpoint);
+        let (asked, written) = keeper.write(checkpoint, last);
         match written {
             Ok(()) => {
                 self.log.iter().for_each(|log| log.checkpoint(checkpoint.status, &keeper.path, begin.elapsed()));
@@ -424,6 +447,9 @@ impl Observer for Audience<'_> {
     fn progress(&self, status: &Status) {
         self.progress.progress(status);
         self.log.iter().for_each(|log| log.progress(status));
+        if let Some(failure) = self.log.as_ref().and_then(Log::new_failure) {
+            self.progress.say(&format!("warning: log: {failure}; its lines are kept and written when there is room"));
+        }
     }
 
     fn round(&self, report: &RoundReport) {
@@ -449,11 +475,11 @@ impl Observer for Audience<'_> {
     }
 
     fn checkpoint(&self, checkpoint: &Checkpoint) {
-        self.keep(checkpoint);
+        self.keep(checkpoint, false);
     }
 
     fn ended(&self, checkpoint: &Checkpoint) {
-        self.keep(checkpoint);
+        self.keep(checkpoint, true);
     }
 
     fn finished(&self, summary: &Summary) {

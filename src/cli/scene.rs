@@ -61,7 +61,9 @@ impl SceneArguments {
 
     /// The first half of [`open`](Self::open): reads the file.
     pub fn describe(&self, threads: Option<usize>, quiet: bool) -> Result<SceneDescription, Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(number(threads)).thread_name(|i| format!("load {i}"));
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(number_of_threads(threads))
+            .thread_name(|i| format!("load {i}"));
         let pool = pool.build().map_err(Failure::running)?;
         let watch = Watch::default();
         let load = || pool.install(|| load::watched(&self.path, &self.defines, Reach::confined(self.confine), &watch));
@@ -72,7 +74,7 @@ impl SceneArguments {
 impl Opened {
     /// The second half of [`SceneArguments::open`]: builds the scene.
     pub fn of(description: SceneDescription, threads: Option<usize>, quiet: bool) -> Result<Opened, Failure> {
-        let device = Device::on_threads(number(threads), "").map_err(Failure::input)?;
+        let device = Device::on_threads(number_of_threads(threads), "").map_err(Failure::input)?;
         let warnings = description.warnings.clone();
         let building = Building::new(Features::of(&description).triangles);
         let scene =
@@ -83,6 +85,6 @@ impl Opened {
 }
 
 /// The threads that are asked for, or as many as the machine runs at once.
-fn number(threads: Option<usize>) -> usize {
+pub(super) fn number_of_threads(threads: Option<usize>) -> usize {
     threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from))
 }

@@ -1,5 +1,5 @@
 //! Ctrl-C, SIGTERM and SIGHUP: the first ends a run with the image of what is done, the second ends it at once. SIGUSR1
-//! asks for a checkpoint.
+//! asks for a checkpoint. SIGXFSZ is nothing but a file that cannot grow.
 
 use std::process;
 use std::sync::Arc;
@@ -30,4 +30,11 @@ pub(super) fn checkpoint_flag() -> Result<Arc<AtomicBool>, Failure> {
     signal_hook::flag::register(signal_hook::consts::SIGUSR1, flag.clone())
         .map_err(|error| Failure::running(format_args!("cannot listen to SIGUSR1: {error}")))?;
     Ok(flag)
+}
+
+/// Lets a file that reaches the limit of its size (`ulimit -f`) be an error of writing it, as a full disk is, instead of the
+/// process's end, which SIGXFSZ is by default.
+pub(super) fn survive_limits_of_files() {
+    #[cfg(unix)]
+    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false))));
 }

@@ -428,3 +428,100 @@ impl<A: Copy, const N: usize> RayHit<A, N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::embree::ffi::{CallbackArguments, QueryContext};
+    use crate::embree::quadric::{self, Quadric};
+    use std::ptr;
+
+    /// What Embree asks about a packet whose address that is.
+    fn question<A, P, const N: usize>(
+        quadric: &Quadric,
+        context: &QueryContext,
+        valid: &Valid<A, N>,
+        packet: &mut P,
+    ) -> CallbackArguments {
+        CallbackArguments {
+            valid: valid.lanes.as_ptr(),
+            user: ptr::from_ref(quadric).cast(),
+            primitive: 0,
+            context: ptr::from_ref(context),
+            rays: ptr::from_mut(packet).cast(),
+            lanes: N as u32,
+            geometry: 5,
+        }
+    }
+
+    /// Rays along z towards a sphere of radius 1, with what they meet by Pythagoras.
+    fn rays_and_distances(n: usize) -> (Rays, Vec<Option<f32>>) {
+        let mut rays = Rays::with_capacity(n);
+        let distances = (0..n).map(|i| {
+            let x = i as f32 / 8.0 - 1.5;
+            rays.push(Vec3::new(x, 0.0, -3.0), Vec3::Z, if i == 11 { 1.0 } else { f32::INFINITY });
+            (x.abs() < 1.0 && i != 11).then(|| 3.0 - (1.0 - x * x).sqrt())
+        });
+        let distances = distances.collect();
+        (rays, distances)
+    }
+
+    /// Packets of N with our own callbacks in the place of Embree. Miri can run this: see `tests/sanitize.sh`.
+    fn packets_of<A: Copy, const N: usize>() {
+        let sphere = Quadric::sphere(Vec3::ZERO, 1.0);
+        let context = QueryContext { instance: 7 };
+        for n in [0, 1, N, 2 * N + 1, 25] {
+            let (rays, distances) = rays_and_distances(n);
+            let mut hits = Hits::default();
+            closest::<A, N, true>(&rays, &mut hits, |valid, packet| {
+                let question = question(&sphere, &context, valid, packet);
+                // SAFETY: the arguments describe the packet and the sphere, which live for the call.
+                unsafe { quadric::intersect(&question) }
+            });
+            let mut shadows = Vec::new();
+            any::<A, N>(&rays, &mut shadows, |valid, packet| {
+                let question = question(&sphere, &context, valid, packet);
+                // SAFETY: as above.
+                unsafe { quadric::occluded(&question) }
+            });
+            assert_eq!((hits.t.len(), shadows.len()), (n, n));
+            for (i, distance) in distances.into_iter().enumerate() {
+                let hit = hits.get(i);
+                assert_eq!(
+                    (hit.is_some(), shadows[i]),
+                    (distance.is_some(), distance.is_some()),
+                    "{N}: ray {i} of {n}"
+                );
+                if let Some((hit, distance)) = hit.zip(distance) {
+                    assert!((hit.t - distance).abs() < 1e-6, "{hit:?} at {distance}");
+                    assert_eq!((hit.geometry, hit.primitive, hit.instance), (5, 0, 7));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn packets_of_all_widths_are_filled_asked_about_and_read_in_bounds() {
+        packets_of::<Align16, 1>();
+        packets_of::<Align16, 4>();
+        packets_of::<Align32, 8>();
+        packets_of::<Align64, 16>();
+    }
+
+    #[test]
+    fn bounds_are_written_where_embree_wants_them() {
+        let disk = Quadric::disk(Vec3::new(1.0, 2.0, 3.0), Vec3::Z, 0.5);
+        let mut bounds = ffi::Bounds::default();
+        let question = ffi::BoundsArguments {
+            user: ptr::from_ref(&disk).cast(),
+            primitive: 0,
+            time_step: 0,
+            bounds: ptr::from_mut(&mut bounds),
+        };
+        // SAFETY: as above.
+        unsafe { quadric::bounds(&question) };
+        let [lower, upper] = [bounds.lower, bounds.upper].map(Vec3::from);
+        assert!(lower.abs_diff_eq(Vec3::new(0.5, 1.5, 3.0), 1e-4) && upper.abs_diff_eq(Vec3::new(1.5, 2.5, 3.0), 1e-4));
+        assert!(lower.z < 3.0 && upper.z > 3.0, "wider than flat");
+    }
+}

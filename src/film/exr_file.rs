@@ -17,7 +17,7 @@ use exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
 use exr::meta::header::{ImageAttributes, LayerAttributes};
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
 
-use super::file::{FileError, write_whole};
+use super::file::{FileError, plain, write_whole};
 use super::image::{Image, PixelFormat, Plane, Window};
 use crate::memory;
 
@@ -146,7 +146,10 @@ pub fn write_part(
     let [width, height] = window.whole.map(|pixels| pixels as usize);
     let whole = ImageAttributes::new(IntegerBounds::from_dimensions((width, height)));
     write_whole(path, |file| {
-        ExrImage::new(whole, layer).write().non_parallel().to_buffered(file).map_err(|error| error.to_string())
+        ExrImage::new(whole, layer).write().non_parallel().to_buffered(file).map_err(|error| match error {
+            exr::error::Error::Io(error) => plain(&error),
+            other => other.to_string(),
+        })
     })
 }
 

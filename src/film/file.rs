@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -82,6 +83,44 @@ pub fn write_whole_and_keep(
     Ok(())
 }
 
+/// A file that could not be written where it was wanted.
+#[derive(Debug)]
+pub struct Misplaced {
+    /// Why not.
+    pub error: FileError,
+    /// Where it is instead, or why it is nowhere.
+    pub instead: Result<PathBuf, FileError>,
+}
+
+impl fmt::Display for Misplaced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let error = &self.error;
+        match &self.instead {
+            Ok(path) => write!(f, "{error}; it is in {} instead", path.display()),
+            Err(other) => write!(f, "{error}; nor elsewhere: {other}"),
+        }
+    }
+}
+
+/// Writes a file that would be lost otherwise with the work that is in it: where `path` is refused, into a new folder among
+/// the system's temporary files, under the same name. `write` is given the path.
+pub fn write_somewhere(path: &Path, write: impl Fn(&Path) -> Result<(), FileError>) -> Result<(), Misplaced> {
+    let Err(error) = write(path) else { return Ok(()) };
+    let name = path.file_name().unwrap_or_default();
+    let temporary = std::env::temp_dir();
+    let instead = Builder::new()
+        .prefix("relt-")
+        .tempdir_in(&temporary)
+        .map_err(|error| FileError::write(&temporary.join(name), plain(&error)))
+        .and_then(|folder| {
+            let other = folder.path().join(name);
+            write(&other)?;
+            drop(folder.keep()); // a path: the folder stays
+            Ok(other)
+        });
+    Err(Misplaced { error, instead })
+}
+
 /// Finds out now whether [`write_whole`] will be able to write `path`; leaves nothing behind.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     create_beside(path).map(drop)
@@ -113,13 +152,48 @@ fn create_named(path: &Path, builder: &mut Builder) -> Result<NamedTempFile, Fil
 }
 
 /// The system's words without the name of the temporary file, which would only confuse.
-fn plain(error: &io::Error) -> String {
+pub fn plain(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::PermissionDenied => "permission denied".into(),
         io::ErrorKind::StorageFull => "the disk is full".into(),
+        io::ErrorKind::QuotaExceeded => "the quota of disk space is used up".into(),
+        io::ErrorKind::FileTooLarge => "it is larger than files may be here (ulimit -f, or the file system)".into(),
         io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".into(),
         io::ErrorKind::NotADirectory => "a part of its path is not a folder".into(),
         io::ErrorKind::InvalidFilename => "its name is too long or not allowed".into(),
         _ => error.get_ref().map_or_else(|| error.to_string(), ToString::to_string),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_finds_no_place_is_put_among_temporary_files_and_told_where() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |path: &Path| write_whole(path, |file| file.write_all(b"work").map_err(|error| error.to_string()));
+        let good = folder.path().join("good");
+        write_somewhere(&good, write).unwrap();
+        assert_eq!(std::fs::read(&good).unwrap(), b"work");
+        let misplaced = write_somewhere(&folder.path().join("nowhere/a.exr"), write).unwrap_err();
+        let told = misplaced.to_string();
+        let instead = misplaced.instead.unwrap();
+        assert!(told.contains("there is no folder") && told.contains(&instead.display().to_string()), "{told}");
+        assert_eq!((std::fs::read(&instead).unwrap(), instead.file_name()), (b"work".to_vec(), Some("a.exr".as_ref())));
+        std::fs::remove_dir_all(instead.parent().unwrap()).unwrap();
+    }
+
+    #[test]
+    fn what_finds_no_place_anywhere_leaves_nothing_behind() {
+        let tried = std::cell::RefCell::new(Vec::new());
+        let refuse = |path: &Path| {
+            tried.borrow_mut().push(path.to_owned());
+            Err(FileError::write(path, "the disk is full"))
+        };
+        let told = write_somewhere(Path::new("a.exr"), refuse).unwrap_err().to_string();
+        assert!(told.starts_with("cannot write a.exr: the disk is full; nor elsewhere: cannot write /"), "{told}");
+        let [wanted, other] = &tried.borrow()[..] else { panic!("two places") };
+        assert!(wanted == Path::new("a.exr") && !other.parent().unwrap().exists(), "{}", other.display());
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::file::{FileError, write_whole};
+use super::file::{FileError, plain, write_whole};
 use super::image::Image;
 
 /// Writes the image as it looks on a screen: linear 1 is full brightness, what is brighter is clipped.
@@ -27,9 +27,14 @@ fn encode_to(file: impl Write, image: &Image) -> Result<(), String> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-    writer.write_image_data(&bytes).map_err(|error| error.to_string())?;
-    writer.finish().map_err(|error| error.to_string())
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(&bytes)?;
+        writer.finish()
+    });
+    written.map_err(|error| match error {
+        png::EncodingError::IoError(error) => plain(&error),
+        other => other.to_string(),
+    })
 }
 
 /// The byte of a linear value, IEC 61966-2-1: 12.92 v up to 0.0031308, 1.055 v^(1/2.4) − 0.055 above.

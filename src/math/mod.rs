@@ -1,6 +1,7 @@
 //! Mathematics that knows nothing of rendering: frames, warps with density and inverse, elementary functions.
 
 mod cumulative;
+pub mod denormals;
 mod elementary;
 mod frame;
 mod instructions;

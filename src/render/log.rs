@@ -3,8 +3,9 @@
 //! `run_start` tells machine, versions, scene and settings; `snapshot` where the run stood at some time; `round` what a
 //! round of replica exchange came to ([`RoundReport`]); `checkpoint` that one was written, `run_resume` that another process
 //! goes on with it; `run_end` the same as a snapshot at the end, with the files
-//! written, the warnings, and whether the run can be trusted ([`Health`]). Times are seconds, rates are probabilities. A line is on its way to
-//! the disk once its event is over, so the log of a run that was killed is complete up to then.
+//! written, the warnings, and whether the run can be trusted ([`Health`]). Times are seconds, rates are probabilities. A line
+//! is on its way to the disk once its event is over, so the log of a run that was killed is complete up to then. Lines that
+//! find no room are kept and go with the next one that does.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -21,7 +22,7 @@ use super::output::Picture;
 use super::settings::Settings;
 use super::status::{Observer, RunStart, Status, Summary};
 use crate::chain::TechniqueChanges;
-use crate::film::file::{FileError, check_writable, write_whole};
+use crate::film::file::{FileError, check_writable, plain, write_whole};
 use crate::tempering::RoundReport;
 
 /// Finds out now whether a log can be written to `path`; leaves it as it is.
@@ -79,8 +80,12 @@ struct State {
     elapsed: Duration,
     /// The run's beginning is in the log already.
     goes_on: bool,
-    /// The first failure; nothing is written after it.
+    /// Bytes of lines that are yet to be written: more than none only while that fails.
+    pending: Vec<u8>,
+    /// What went wrong last, until all is written.
     failed: Option<io::Error>,
+    /// That it failed has been told.
+    told: bool,
 }
 
 /// Snapshot lines are this far apart at least, and their times grow by a quarter each: errors are plotted against
@@ -121,14 +126,30 @@ impl Log {
 
     /// A log to anything that can be written to.
     pub fn new(file: impl Write + Send + 'static) -> Log {
-        let state =
-            State { file: Box::new(file), due: SHORTEST_GAP, elapsed: Duration::ZERO, goes_on: false, failed: None };
-        Log { state: Mutex::new(state) }
+        Log {
+            state: Mutex::new(State {
+                file: Box::new(file),
+                due: SHORTEST_GAP,
+                elapsed: Duration::ZERO,
+                goes_on: false,
+                pending: Vec::new(),
+                failed: None,
+                told: false,
+            }),
+        }
     }
 
-    /// What kept the log from being complete, if anything did.
+    /// What keeps the log from being complete, if anything does.
     pub fn failure(&self) -> Option<String> {
-        self.state().failed.as_ref().map(ToString::to_string)
+        self.state().failed.as_ref().map(plain)
+    }
+
+    /// The same where it has not been asked for before: once each time that writing begins to fail.
+    pub fn new_failure(&self) -> Option<String> {
+        let mut state = self.state();
+        let fails = state.failed.is_some();
+        let fresh = !std::mem::replace(&mut state.told, fails);
+        state.failed.as_ref().filter(|_| fresh).map(plain)
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
@@ -138,15 +159,23 @@ impl Log {
 
 impl State {
     fn line(&mut self, event: &Event) {
-        if self.failed.is_some() {
-            return;
+        let line = serde_json::to_vec(event).expect("events are plain data");
+        self.pending.extend(line);
+        self.pending.push(b'\n');
+        self.failed = self.write().err();
+    }
+
+    /// Writes what is pending: what does not find room now goes with a later line, from the byte on that was refused.
+    fn write(&mut self) -> io::Result<()> {
+        while !self.pending.is_empty() {
+            match self.file.write(&self.pending) {
+                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+                Ok(written) => drop(self.pending.drain(..written)),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
         }
-        let written = serde_json::to_vec(event).map_err(io::Error::from).and_then(|mut line| {
-            line.push(b'\n');
-            self.file.write_all(&line)?;
-            self.file.flush()
-        });
-        self.failed = written.err();
+        self.file.flush()
     }
 }
 
@@ -453,23 +482,46 @@ mod tests {
         assert!((30..60).contains(&times.len()), "{} lines", times.len());
     }
 
-    #[test]
-    fn a_full_disk_is_remembered_and_stops_nothing() {
-        struct Full;
-        impl Write for Full {
-            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-                Err(io::ErrorKind::StorageFull.into())
-            }
+    /// A disk of so many bytes, in which room can be made.
+    #[derive(Clone, Default)]
+    struct Disk {
+        file: Shared,
+        room: Arc<Mutex<usize>>,
+    }
 
-            fn flush(&mut self) -> io::Result<()> {
-                Ok(())
-            }
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let mut room = self.room.lock().unwrap();
+            let fits = bytes.len().min(*room);
+            *room -= fits;
+            if fits == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.file.write(&bytes[..fits]) }
         }
-        let log = Log::new(Full);
-        assert_eq!(log.failure(), None);
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn lines_that_a_full_disk_refused_come_later_from_the_byte_on_that_had_no_room() {
+        let disk = Disk::default();
+        let log = Log::new(disk.clone());
+        let room = |bytes: usize| *disk.room.lock().unwrap() = bytes;
+        room(40); // not enough for a line
         log.started(&RunStart::default());
+        assert_eq!(log.failure(), Some("the disk is full".into()));
+        assert_eq!(log.new_failure(), log.failure());
         log.progress(&status(1));
-        assert!(log.failure().is_some());
+        assert_eq!((log.failure().is_some(), log.new_failure()), (true, None), "told once");
+        assert_eq!(disk.file.0.lock().unwrap().len(), 40);
+        room(1 << 20);
+        log.progress(&status(2));
+        assert_eq!((log.failure(), log.new_failure()), (None, None));
+        let seconds = lines(&disk.file).iter().map(|line| line["seconds"].as_f64()).collect::<Vec<_>>();
+        assert_eq!(seconds, [None, Some(1.0), Some(2.0)], "every line, in order");
+        room(0);
+        log.progress(&status(3));
+        assert!(log.new_failure().is_some(), "told again when it begins again");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use super::settings::{MappingChoice, Method, Settings};
 use crate::chain::LargeSteps;
 use crate::film::Accumulator;
-pub use crate::memory::available;
 use crate::memory::gigabytes;
+pub use crate::memory::{available, space_left};
 use crate::scene::description::FilmDescription;
 use crate::tempering::{Choices, LadderChoice, Layers};
 
@@ -27,6 +27,12 @@ const BYTES_OF_PICTURE_A_LAYER: u64 = 32;
 const BYTES_OF_PICTURE: u64 = 2 * (12 + 4);
 /// Replicas where their number is free, at most two of which have layers of their own.
 const REPLICAS: usize = 2;
+
+/// Address space of a thread: a stack of 2 MiB, and an arena of the allocator of 64 MiB, for which glibc asks for 128 MiB
+/// to find an aligned half. Very little of it is ever touched.
+const SPACE_OF_A_THREAD: u64 = (2 + 128) << 20;
+/// Address space that Embree and TBB take for their code and data (180 MiB of Embree 4.4), and what chains and tables may.
+const SPACE_OF_EMBREE: u64 = 256 << 20;
 
 impl FilmMemory {
     /// Of a run with those settings; of the mapping that takes most where a trial chooses it.
@@ -67,6 +73,23 @@ impl FilmMemory {
             gigabytes(self.sums),
             gigabytes(self.most)
         )
+    }
+
+    /// Why a run on so many threads cannot be had where only so much address space is left to be had; none if it can.
+    pub fn fault_of_space(&self, threads: usize, left: u64) -> Option<String> {
+        let of_threads = threads as u64 * SPACE_OF_A_THREAD;
+        let all = self.most + of_threads + SPACE_OF_EMBREE;
+        (all > left).then(|| {
+            format!(
+                "memory is short: the run takes up to {} of address space ({} for the film, {} for Embree and tables, {} for \
+                 {threads} threads), and {} are left of its limit (ulimit -v); raise that, or use fewer --threads",
+                gigabytes(all),
+                gigabytes(self.most),
+                gigabytes(SPACE_OF_EMBREE),
+                gigabytes(of_threads),
+                gigabytes(left)
+            )
+        })
     }
 
     /// Why the film cannot be had where only so much memory is to be had; none if it can.
@@ -110,5 +133,14 @@ mod tests {
         assert!(memory.fault(memory.most).is_none());
         let fault = memory.fault(memory.most - 1).unwrap();
         assert!(fault.contains("16384 × 16384 pixels in 1 layer take 17.2 GB"), "{fault}");
+    }
+
+    #[test]
+    fn limits_of_address_space_are_known_to_be_too_narrow() {
+        let memory = FilmMemory::of(&FilmDescription::new(1000, 1000, Filter::Box), &Settings::default());
+        let needed = memory.most + 2 * SPACE_OF_A_THREAD + SPACE_OF_EMBREE;
+        assert!(memory.fault_of_space(2, needed).is_none());
+        let fault = memory.fault_of_space(2, needed - 1).unwrap();
+        assert!(fault.contains("0.3 GB for 2 threads") && fault.contains("ulimit -v"), "{fault}");
     }
 }

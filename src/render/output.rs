@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::health::Health;
 use super::settings::Method;
 use super::status::{RunStart, Status};
-use crate::film::file::{FileError, check_writable};
+use crate::film::file::{FileError, check_writable, write_somewhere};
 use crate::film::{Image, PixelFormat, Plane, Value, Window, exr_file, png_file};
 use crate::scene::description::FilmDescription;
 use crate::tempering::{Normaliser, RoundReport, RungReport};
@@ -92,6 +92,26 @@ impl Output {
             picture.write(exr)?;
         }
         png_file::write(&self.png, &picture.image)
+    }
+
+    /// Writes all files at the end of a run, each where it was wanted or else [somewhere](write_somewhere): those that are
+    /// there, and what to say of those that are not where they were wanted.
+    pub fn write_somewhere(&self, picture: &Picture) -> (Vec<PathBuf>, Vec<String>) {
+        let (mut there, mut failures) = (Vec::new(), Vec::new());
+        for file in self.files() {
+            let written = write_somewhere(&file, |path| match &self.exr {
+                Some(exr) if *exr == file => picture.write(path),
+                _ => png_file::write(path, &picture.image),
+            });
+            match written {
+                Ok(()) => there.push(file),
+                Err(misplaced) => {
+                    failures.push(misplaced.to_string());
+                    there.extend(misplaced.instead.ok());
+                }
+            }
+        }
+        (there, failures)
     }
 }
 

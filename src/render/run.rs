@@ -25,6 +25,7 @@ use super::{
 };
 use crate::{
     film::Footprint,
+    math::denormals,
     path::{Fault, Mapping, MappingKind, Widths, first_fault},
     rng::Rng,
     saved::{Source, Unfit},
@@ -148,8 +149,16 @@ pub fn run_from(
         observer.ended(&frame.checkpoint(&status(job, engine.as_ref(), &watch), engine.as_ref()));
         Ok((engine, interrupted))
     })?;
-    Ok(conclude(job, &stage, engine.as_mut(), &start, &watch, interrupted))
+    let mut outcome = conclude(job, &stage, engine.as_mut(), &start, &watch, interrupted);
+    if !pool.broadcast(|_| denormals::are_kept()).into_iter().all(|kept| kept) {
+        outcome.warnings.push(FLUSHED.into());
+    }
+    Ok(outcome)
 }
+
+/// What is said where denormal numbers are not kept.
+pub const FLUSHED: &str = "something that was loaded into this process makes its threads take numbers below 1.2e-38 for 0: \
+                           light as faint as that is lost";
 
 /// What is fixed about a run and goes into its checkpoints.
 struct Frame<'a> {

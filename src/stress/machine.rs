@@ -1,14 +1,14 @@
-//! Threads and instruction sets.
+//! Threads, instruction sets, denormal numbers.
 
 use super::{
     Bench, Case, Check,
-    bench::{Effort, described, means, render, way},
+    bench::{Effort, Goal, described, means, render, way},
     check::ROUNDING,
-    scenes::{diffuse, glowing, room, sphere, view},
+    scenes::{diffuse, glowing, room, series, sphere, view},
 };
 use crate::embree::Device;
 use crate::path::MappingKind;
-use crate::render::{Method, Settings};
+use crate::render::{FLUSHED, Method, Settings};
 use crate::scene::{Scene, SceneDescription};
 
 /// The cases.
@@ -25,6 +25,13 @@ pub(super) fn cases() -> Vec<Case> {
             "Embree confined to SSE2 or AVX2 gives the same image but for noise",
             instruction_sets,
         ),
+        Case::new(
+            "machine/denormals",
+            "a sphere that glows by 10⁻³⁸, below the least normal number, looks like 10⁻³⁸ Σ aⁱ, and threads keep denormal \
+             numbers as they trace",
+            faint,
+        )
+        .quick(),
     ]
 }
 
@@ -75,6 +82,25 @@ fn instruction_sets(bench: &Bench) -> Vec<Check> {
             let [a, b] = [&scene, &as_it_is].map(|scene| means(&bench.runs(scene, way, effort)));
             checks.push(Check::same(format!("mean with {isa} by {}", way.name), &a, &b, ROUNDING, 0.4));
         }
+    }
+    checks
+}
+
+/// Contributions are as small as 10⁻³⁸/8 and known to 2⁻¹⁴⁹, a millionth of that.
+fn faint(bench: &Bench) -> Vec<Check> {
+    const RADIANCE: f64 = 1e-38;
+    const ALBEDO: f64 = 0.5;
+    const EDGES: i32 = 4;
+    let scene = bench.scene(
+        &(view(1.0, [[0.5, 0.3, -0.2], [0.9, 0.1, -0.5]], 80.0, EDGES)
+            + &sphere([0.0; 3], 1.0, true, &(diffuse(ALBEDO) + &glowing(RADIANCE)))),
+    );
+    let goal = Goal::new(RADIANCE * series(ALBEDO, EDGES), 0.6);
+    let mut checks = bench.all_ways_give(&scene, goal, Effort { runs: 16, mutations_per_pixel: 192.0 });
+    for way in bench.ways(&scene) {
+        let outcome = render(&scene, Settings { mutations_per_pixel: Some(1.0), threads: Some(2), ..way.settings });
+        let kept = !outcome.warnings.iter().any(|warning| warning == FLUSHED);
+        checks.push(Check::holds(format!("denormal numbers are kept by {}", way.name), kept));
     }
     checks
 }

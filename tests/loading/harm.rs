@@ -22,7 +22,11 @@ fn entities_are_not_known_at_all() {
         around("<shape type='cube' id='&b;&c;'/>")
     );
     assert_faults(&text, &[], &["1:1: malformed XML: "]);
-    assert_faults(&around("<shape type='cube' id='&b;'/>"), &[], &["2:24: malformed XML: unknown entity reference 'b'"]);
+    assert_faults(
+        &around("<shape type='cube' id='&b;'/>"),
+        &[],
+        &["2:24: malformed XML: unknown entity reference 'b'"],
+    );
 }
 
 #[test]
@@ -115,7 +119,9 @@ fn headers_of_meshes_may_promise_anything() {
     let header = |count: &str| {
         let vertex = "property float x\nproperty float y\nproperty float z\n";
         let face = "property list uchar int vertex_indices\n";
-        format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{vertex}element face {count}\n{face}end_header\n")
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{vertex}element face {count}\n{face}end_header\n"
+        )
     };
     for count in ["4294967296", "18446744073709551615", "99999999999999999999", "-1", "1e9"] {
         let fault = load::mesh("ply", header(count).as_bytes()).unwrap_err();
@@ -276,7 +282,8 @@ fn conversions_are_confined_as_well() {
     let folder = around_a_scene();
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
                property list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-    let out = [("out.ply", ply), ("out.pbrt", ""), ("out.spd", "400 1\n700 1\n"), ("out.xml", "<scene version='0.6.0'/>")];
+    let out =
+        [("out.ply", ply), ("out.pbrt", ""), ("out.spd", "400 1\n700 1\n"), ("out.xml", "<scene version='0.6.0'/>")];
     for (name, content) in out {
         std::fs::write(folder.path(name), content).unwrap();
     }
@@ -297,7 +304,10 @@ fn conversions_are_confined_as_well() {
         converted(&folder, name, &text, Reach::Plain).unwrap_or_else(|fault| panic!("{text}\n{fault}"));
         let fault = converted(&folder, name, &text, Reach::Confined).unwrap_err();
         let file = fault.contains("out.");
-        assert!(file && fault.contains("it is outside of the scene's folder, which --confine forbids"), "{text}\n{fault}");
+        assert!(
+            file && fault.contains("it is outside of the scene's folder, which --confine forbids"),
+            "{text}\n{fault}"
+        );
     }
     let hidden = "<scene version='0.6.0'><default name='up' value='..'/><include filename='$up/out.xml'/></scene>";
     let fault = converted(&folder, "a.xml", hidden, Reach::Plain).unwrap_err();
