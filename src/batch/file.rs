@@ -403,13 +403,14 @@ fn filled<'a>(text: &str, value_of: &dyn Fn(&str) -> Option<&'a str>) -> Result<
         if value.contains('{') {
             return Err(format!("{{{inside}}}: the value has placeholders of its own"));
         }
-        let zeros = match (width.strip_prefix('0'), width) {
-            (_, "") => 0,
-            (Some(number), _) => number.parse::<usize>().ok().filter(|zeros| *zeros <= 20).ok_or_else(|| {
-                format!("{{{inside}}}: behind the colon is a number of digits, such as {{{key}:04}}")
-            })?,
-            (None, _) => return Err(format!("{{{inside}}}: write {{{key}:04}} for four digits")),
-        };
+        let zeros =
+            match (width.strip_prefix('0'), width) {
+                (_, "") => 0,
+                (Some(number), _) => number.parse::<usize>().ok().filter(|zeros| *zeros <= 20).ok_or_else(|| {
+                    format!("{{{inside}}}: behind the colon is a number of digits, such as {{{key}:04}}")
+                })?,
+                (None, _) => return Err(format!("{{{inside}}}: write {{{key}:04}} for four digits")),
+            };
         result += before;
         let (sign, digits) = value.strip_prefix('-').map_or(("", value), |digits| ("-", digits));
         result += &format!("{sign}{digits:0>zeros$}");

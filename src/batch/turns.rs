@@ -21,10 +21,7 @@ struct State {
 impl Turns {
     /// So many at once.
     pub fn new(at_once: usize) -> Turns {
-        Turns {
-            state: Mutex::new(State { next: 0, passed: BTreeSet::new(), free: at_once }),
-            changed: Condvar::new(),
-        }
+        Turns { state: Mutex::new(State { next: 0, passed: BTreeSet::new(), free: at_once }), changed: Condvar::new() }
     }
 
     /// The turn of that number; each number is asked for once. A turn that is dropped without having begun is passed over.

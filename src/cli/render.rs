@@ -17,8 +17,8 @@ use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Teller, Verbosity};
 use crate::render::{
-    self, Checkpoint, Health, Job, Observer, Outcome, Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status,
-    Summary, Verdict, checkpoint, replay,
+    self, Checkpoint, Health, Job, Observer, Outcome, Output, PacketChoice, Parts, Picture, Resumed, RunStart,
+    Settings, Status, Summary, Verdict, checkpoint, replay,
 };
 use crate::scene::description::FilmDescription;
 use crate::tempering::RoundReport;

@@ -169,7 +169,11 @@ mod tests {
     #[test]
     fn jobs_that_would_write_one_file_are_refused() {
         for (first, second, what) in [
-            ("output = \"a.exr\"\nseed = [1, 2]", "output = \"b.exr\"", "a.exr would write a.exr: a.exr (j.toml:3:1) does"),
+            (
+                "output = \"a.exr\"\nseed = [1, 2]",
+                "output = \"b.exr\"",
+                "a.exr would write a.exr: a.exr (j.toml:3:1) does",
+            ),
             ("output = \"x/../a.exr\"", "output = \"a.png\"", "a.png would write a.png: a.exr (j.toml:3:1) does"),
             ("output = \"a.exr\"\nlog = \"l\"", "output = \"b.exr\"\nlog = \"l\"", "b.exr would write l"),
             ("output = \"a.exr\"\ncheckpoint = \"1m\"", "output = \"a.png\"\ncheckpoint = \"1m\"", "a.checkpoint"),

@@ -133,8 +133,8 @@ impl<'a> Runner<'a> {
     fn job(&self, index: usize, turn: &Turn, asked: &Arc<AtomicBool>) {
         let job = &self.jobs[index];
         let goes_on = self.prepare(job);
-        self.note(job, Event::Begun);
-        let ended = isolated(|| self.attempt(index, goes_on, turn, asked));
+        let begun = AtomicBool::new(false);
+        let ended = isolated(|| self.attempt(index, goes_on, turn, asked, &begun));
         turn.end();
         self.scenes.release(job);
         let name = &job.entry.name;
@@ -164,6 +164,12 @@ impl<'a> Runner<'a> {
         match event {
             Event::Failed { .. } => self.display.say(&words),
             _ => self.display.done(&format!("{}/{} {words}", done + failed, self.due.len())),
+        }
+        if !begun.load(Relaxed) {
+            match event {
+                Event::Failed { .. } => self.note(job, Event::Begun),
+                _ => return, // it was not its turn yet
+            }
         }
         let is_done = matches!(event, Event::Done(_));
         self.note(job, event);
@@ -197,7 +203,15 @@ impl<'a> Runner<'a> {
         standings.insert(name.clone(), Standing { digest: digest.clone(), attempts, last: event });
     }
 
-    fn attempt(&self, index: usize, goes_on: bool, turn: &Turn, asked: &Arc<AtomicBool>) -> Result<End, Failure> {
+    /// From options to files on the disk; `begun` is raised when it renders.
+    fn attempt(
+        &self,
+        index: usize,
+        goes_on: bool,
+        turn: &Turn,
+        asked: &Arc<AtomicBool>,
+        begun: &AtomicBool,
+    ) -> Result<End, Failure> {
         let job = &self.jobs[index];
         if let Some(folder) = job.entry.output.parent() {
             fs::create_dir_all(folder)
@@ -214,6 +228,8 @@ impl<'a> Runner<'a> {
         if self.stop.load(Relaxed) {
             return Ok(End::Interrupted);
         }
+        begun.store(true, Relaxed);
+        self.note(job, Event::Begun);
         let voice = Voice { runner: self, index, turn, begin: Instant::now(), ended: Mutex::new(None) };
         let asked = job.keep.as_ref().map(|_| asked.clone());
         let rendered = planned.render(&loaded.opened, &loaded.digest, asked, self.stop, &voice)?;
