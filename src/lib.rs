@@ -8,7 +8,7 @@
 //! it to a light path whose rays [`embree`] traces through the [`scene`], [`chain`] accepts or rejects it,
 //! [`tempering`] swaps it along its ladder, [`film`] gathers its splats, and [`render`] repeats that until the
 //! budget is spent. [`load`] makes scenes from files and [`cli`] jobs from command lines; [`convert`] makes such files
-//! of other renderers' scenes; [`study`] draws what runs leave behind; [`stress`] checks all of it at the ends of what
+//! of other renderers' scenes; [`study`] draws what runs leave behind; [`batch`] keeps queues of them; [`stress`] checks all of it at the ends of what
 //! numbers can be.
 //!
 //! ```standalone_crate
@@ -27,6 +27,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod batch;
 pub mod chain;
 pub mod checksum;
 pub mod cli;

@@ -1,6 +1,8 @@
 //! Runs that are interrupted, killed and gone on with come to the same picture, bit by bit, and what cannot be gone on
 //! with is refused by its name.
 
+#[path = "batch/mod.rs"]
+mod batch;
 #[path = "support/program.rs"]
 mod program;
 

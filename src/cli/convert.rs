@@ -57,8 +57,9 @@ pub(super) fn run(arguments: Convert) -> Result<(), Failure> {
             Ok(())
         }
         Err(ConvertError::Input(errors)) => {
-            let shown = errors.into_iter().map(|error| Failure::shown(error).to_string()).collect();
-            Err(Failure::Shown(shown))
+            let shown: Vec<Failure> = errors.into_iter().map(Failure::shown).collect();
+            let plain: Vec<String> = shown.iter().map(Failure::plain).collect();
+            Err(Failure::Shown { text: shown.iter().map(Failure::to_string).collect(), plain: plain.join("\n") })
         }
         Err(ConvertError::LeftOut(notes)) => {
             list(&notes);

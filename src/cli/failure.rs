@@ -10,8 +10,9 @@ use super::signals;
 pub(super) enum Failure {
     /// Nothing could be begun, for these reasons; code 2.
     Input(Vec<String>),
-    /// The same with a text that needs no `error:` before it, such as a marked-up piece of a scene file; code 2.
-    Shown(String),
+    /// The same with a text that needs no `error:` before it, such as a marked-up piece of a scene file, and in plain
+    /// words; code 2.
+    Shown { text: String, plain: String },
     /// It failed on the way, for these reasons; code 1.
     Running(Vec<String>),
     /// All was done, but what came of it is beyond these limits that were set; code 3.
@@ -33,13 +34,23 @@ impl Failure {
 
     /// A fault of an input file, shown in place; colours and frames only where standard error is a terminal.
     pub fn shown(report: impl miette::Diagnostic + Send + Sync + 'static) -> Failure {
-        Failure::Shown(format!("{:?}\n", miette::Report::new(report)))
+        let plain = report.to_string();
+        Failure::Shown { text: format!("{:?}\n", miette::Report::new(report)), plain }
+    }
+
+    /// The reasons alone, one a line.
+    pub fn plain(&self) -> String {
+        match self {
+            Failure::Input(reasons) | Failure::Running(reasons) | Failure::Exceeded(reasons) => reasons.join("\n"),
+            Failure::Shown { plain, .. } => plain.clone(),
+            Failure::Interrupted(reason) => reason.clone(),
+        }
     }
 
     pub fn code(&self) -> ExitCode {
         match self {
             Failure::Running(_) => ExitCode::from(1),
-            Failure::Input(_) | Failure::Shown(_) => ExitCode::from(2),
+            Failure::Input(_) | Failure::Shown { .. } => ExitCode::from(2),
             Failure::Exceeded(_) => ExitCode::from(3),
             Failure::Interrupted(_) => ExitCode::from(signals::ENDED as u8),
         }
@@ -52,7 +63,7 @@ impl fmt::Display for Failure {
             Failure::Input(reasons) | Failure::Running(reasons) | Failure::Exceeded(reasons) => {
                 reasons.iter().try_for_each(|reason| writeln!(f, "error: {reason}"))
             }
-            Failure::Shown(text) => f.write_str(text),
+            Failure::Shown { text, .. } => f.write_str(text),
             Failure::Interrupted(reason) => writeln!(f, "stopped: {reason}"),
         }
     }

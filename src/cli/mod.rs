@@ -1,7 +1,9 @@
 //! Command lines to typed jobs: one file a subcommand.
 
+mod batch;
 mod compare;
 mod convert;
+mod display;
 mod failure;
 mod info;
 mod ladder;
@@ -33,6 +35,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Batch(batch::Batch),
     Merge(merge::Merge),
     Info(info::Info),
     Replay(Box<replay::Replay>),
@@ -48,6 +51,7 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    the image was written, whole or up to a first Ctrl-C, SIGTERM or SIGHUP
   1    something failed while running, such as a full disk
+       relt batch: also where a job failed, after all others
   2    nothing was begun: faulty options, scene or images, no Embree, unwritable files, checkpoints of something else
        relt convert: also with --strict where something would be left out
   3    relt render --strict: the picture cannot be trusted
@@ -55,7 +59,7 @@ Exit codes:
        relt reference: --time was over before --target-relmse was reached
        relt stress: a case failed
   130  ended at once by a second signal, without an image
-       relt reference, relt study: also by the first, before all was done; the same command goes on";
+       relt reference, relt study, relt batch: also by the first, before all was done; the same command goes on";
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
@@ -70,6 +74,7 @@ pub fn main() -> ExitCode {
     signals::survive_limits_of_files();
     let done = match arguments.command {
         Command::Render(arguments) => render::run(*arguments),
+        Command::Batch(arguments) => batch::run(arguments),
         Command::Merge(arguments) => merge::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Replay(arguments) => replay::run(*arguments),

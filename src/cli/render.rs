@@ -6,20 +6,21 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::{Arg, ArgAction, Args, CommandFactory, Parser};
 
 use super::failure::Failure;
 use super::run_options::RunOptions;
 use super::scene::{Opened, SceneArguments, number_of_threads};
 use super::{signals, values};
-use crate::film::file::{check_writable, write_somewhere};
+use crate::film::file::{Claim, check_writable, claim, write_somewhere};
 use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
-use crate::render::progress::{Progress, Verbosity};
+use crate::render::progress::{Progress, Teller, Verbosity};
 use crate::render::{
-    self, Checkpoint, Health, Job, Observer, Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status,
-    Summary, Verdict, checkpoint, replay,
+    self, Checkpoint, Health, Job, Observer, Outcome, Output, PacketChoice, Parts, Picture, Resumed, RunStart,
+    Settings, Status, Summary, Verdict, checkpoint, replay,
 };
+use crate::scene::description::FilmDescription;
 use crate::tempering::RoundReport;
 
 /// Renders a scene to an OpenEXR image with a PNG preview
@@ -27,7 +28,7 @@ use crate::tempering::RoundReport;
 #[command(after_help = super::EXIT_CODES)]
 pub(super) struct Render {
     #[command(flatten)]
-    scene: SceneArguments,
+    pub(super) scene: SceneArguments,
 
     #[command(flatten)]
     run: RunOptions,
@@ -43,11 +44,11 @@ pub(super) struct Render {
 
     /// Writes a log, one JSON object a line; with --resume it goes on in the file that is there
     #[arg(long, value_name = "FILE", help_heading = "Files")]
-    log: Option<PathBuf>,
+    pub(super) log: Option<PathBuf>,
 
     /// Ends with exit code 3 where the picture cannot be trusted (verdict bad); it is written all the same
     #[arg(long, help_heading = "Files")]
-    strict: bool,
+    pub(super) strict: bool,
 
     /// Writes all that it takes to go on later, at this interval, such as 5m, on SIGUSR1, and at the end, early or not
     #[arg(long, value_name = "TIME", value_parser = values::interval, allow_hyphen_values = true, help_heading = "Files")]
@@ -98,86 +99,139 @@ const WORTH_TELLING: u64 = 1 << 30;
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
-    let keep = arguments.keep();
-    let (resumed, told) = arguments.resumed(keep.as_deref())?;
-    let header = resumed.as_ref().map(|resumed| &resumed.header);
-    let settings = arguments.settings(header.map(|header| &header.start.settings))?;
-    let is_part = settings.parts.only.is_some();
-    // a part has nothing to show but what it keeps
-    let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
-    let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part)?;
+    let (verbosity, strict) = (arguments.verbosity(), arguments.strict);
+    let planned = arguments.plan()?;
     // from now on, also while the scene is read, the signal is no longer the end
-    let asked = keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
-    let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
-    let memory = FilmMemory::of(&description.film, &settings);
-    if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
-        return Err(Failure::input(fault));
-    }
-    let threads = number_of_threads(settings.threads);
-    if let Some(fault) = memory::space_left().and_then(|left| memory.fault_of_space(threads, left)) {
-        return Err(Failure::input(fault));
-    }
-    let is_kept = keep.is_some() || resumed.is_some();
-    let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
-    resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
-    let opened = Opened::of(description, settings.threads, arguments.quiet)?;
-    let done = header.map(|header| header.done.clone());
-    let log = arguments.log.as_deref().map(|path| match &done {
-        Some(done) => Log::resume(path, done.mutations, done.elapsed),
-        None => Log::create(path),
-    });
-    let log = log.transpose().map_err(Failure::input)?;
+    let asked = planned.keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
+    let (threads, quiet) = (planned.settings.threads, verbosity == Verbosity::Quiet);
+    let description = planned.arguments.scene.describe(threads, quiet)?;
+    let scene_digest = if planned.is_kept() { checkpoint::scene_digest(&description) } else { String::new() };
+    planned.fits(&description.film, &scene_digest)?;
+    let opened = Opened::of(description, threads, quiet)?;
     let stop = signals::stop_flag()?;
-    let progress = Progress::new(arguments.verbosity(), stop.clone());
-    let arithmetic = resumed.as_ref().map(|resumed| elsewhere(resumed, &opened)).transpose()?.flatten();
-    if memory.most >= WORTH_TELLING {
-        progress.say(&format!("film: {}", memory.in_words()));
-    }
-    for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
-        progress.say(&format!("warning: {warning}"));
-    }
-    let began = done.as_ref().map_or(Duration::ZERO, |done| done.elapsed);
-    let keeper = keep.zip(asked).map(|(path, asked)| Keeper::new(path, asked, arguments.checkpoint, began));
-    let snapshots = arguments.snapshot.map(|interval| Interval::from(began, interval));
-    let audience = Audience { snapshots, keeper, output: &output, log, progress };
+    let progress = Progress::new(verbosity, stop.clone());
+    let summary = planned.render(&opened, &scene_digest, asked, &stop, &progress)?.finish()?;
+    strict.then(|| untrusted(&summary.health)).flatten().map_or(Ok(()), Err)
+}
 
-    let scene_name = arguments.scene.path.display().to_string();
-    let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
-    let mut outcome = render::run_from(&job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
-    if let Some(fault) = outcome.status.faults.first() {
-        let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
-        let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
-        outcome.warnings.push(format!("the first of those paths: {command}"));
+/// A run of which all is known but the scene. Its files are nobody else's as long as this lives.
+pub(super) struct Planned {
+    pub arguments: Render,
+    /// Where checkpoints go, if there are to be any.
+    pub keep: Option<PathBuf>,
+    resumed: Option<Resumed>,
+    /// What the person should know of that checkpoint.
+    told: Option<String>,
+    pub settings: Settings,
+    output: Output,
+    _claims: Vec<Claim>,
+}
+
+/// A run that is over, with files yet to be written.
+pub(super) struct Rendered<'a> {
+    pub outcome: Outcome,
+    audience: Audience<'a>,
+    is_part: bool,
+    /// What was known before it began.
+    warnings: Vec<String>,
+    _claims: Vec<Claim>,
+}
+
+impl Planned {
+    /// Whether the run leaves a checkpoint or goes on from one, so that its scene must be told from others.
+    pub fn is_kept(&self) -> bool {
+        self.keep.is_some() || self.resumed.is_some()
     }
 
-    let (mut outputs, mut failures) = (Vec::new(), Vec::new());
-    let kept = audience.keeper.as_ref().and_then(Keeper::written);
-    if is_part {
-        failures.extend(audience.keeper.as_ref().and_then(Keeper::failure));
-    } else {
-        (outputs, failures) = output.write_somewhere(&outcome.picture);
-        if let (Some(kept), true) = (&kept, outputs.is_empty()) {
-            failures
-                .push(format!("the picture is made again, and nothing else, by --resume {} -o FILE", kept.display()));
+    /// That the scene's film has room, and that the scene is that of the checkpoint.
+    pub fn fits(&self, film: &FilmDescription, scene_digest: &str) -> Result<(), Failure> {
+        let memory = FilmMemory::of(film, &self.settings);
+        if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
+            return Err(Failure::input(fault));
         }
+        let threads = number_of_threads(self.settings.threads);
+        if let Some(fault) = memory::space_left().and_then(|left| memory.fault_of_space(threads, left)) {
+            return Err(Failure::input(fault));
+        }
+        self.resumed.iter().try_for_each(|resumed| resumed.agrees(scene_digest, &self.settings)).map_err(Failure::input)
     }
-    if let Some(agreement) = &outcome.agreement {
-        audience.progress.say(&agreement.in_words());
+
+    /// Renders. `asked` is raised when a signal asks for a checkpoint, `stop` to end the run early.
+    pub fn render<'a>(
+        self,
+        opened: &'a Opened,
+        scene_digest: &str,
+        asked: Option<Arc<AtomicBool>>,
+        stop: &AtomicBool,
+        progress: &'a dyn Teller,
+    ) -> Result<Rendered<'a>, Failure> {
+        let Planned { arguments, keep, resumed, told, settings, output, _claims } = self;
+        let is_part = settings.parts.only.is_some();
+        let done = resumed.as_ref().map(|resumed| resumed.header.done.clone());
+        let log = arguments.log.as_deref().map(|path| match &done {
+            Some(done) => Log::resume(path, done.mutations, done.elapsed),
+            None => Log::create(path),
+        });
+        let log = log.transpose().map_err(Failure::input)?;
+        let arithmetic = resumed.as_ref().map(|resumed| elsewhere(resumed, opened)).transpose()?.flatten();
+        let memory = FilmMemory::of(&opened.scene.film, &settings);
+        if memory.most >= WORTH_TELLING {
+            progress.say(&format!("film: {}", memory.in_words()));
+        }
+        for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
+            progress.say(&format!("warning: {warning}"));
+        }
+        let began = done.as_ref().map_or(Duration::ZERO, |done| done.elapsed);
+        let keeper = keep.zip(asked).map(|(path, asked)| Keeper::new(path, asked, arguments.checkpoint, began));
+        let snapshots = arguments.snapshot.map(|interval| Interval::from(began, interval));
+        let audience = Audience { snapshots, keeper, output, log, progress };
+
+        let scene_name = arguments.scene.path.display().to_string();
+        let job = Job { scene: &opened.scene, scene_name, settings, stop };
+        let mut outcome = render::run_from(&job, scene_digest, resumed, &audience).map_err(Failure::running)?;
+        if let Some(fault) = outcome.status.faults.first() {
+            let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
+            let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
+            outcome.warnings.push(format!("the first of those paths: {command}"));
+        }
+        let warnings = opened.warnings.iter().cloned().chain(told).collect();
+        Ok(Rendered { outcome, audience, is_part, warnings, _claims })
     }
-    let untrusted = arguments.strict.then(|| untrusted(&outcome.health)).flatten();
-    let failure = if failures.is_empty() { untrusted } else { Some(Failure::Running(failures)) };
-    audience.finished(&Summary {
-        status: outcome.status,
-        health: outcome.health,
-        outputs: outputs.into_iter().chain(kept).collect(),
-        interrupted: outcome.interrupted,
-        warnings: opened.warnings.iter().cloned().chain(told).chain(outcome.warnings).collect(),
-    });
-    failure.map_or(Ok(()), Err)
+}
+
+impl Rendered<'_> {
+    /// Writes the image and tells how the run ended.
+    pub fn finish(self) -> Result<Summary, Failure> {
+        let Rendered { outcome, audience, is_part, warnings, _claims } = self;
+        let (mut outputs, mut failures) = (Vec::new(), Vec::new());
+        let kept = audience.keeper.as_ref().and_then(Keeper::written);
+        if is_part {
+            failures.extend(audience.keeper.as_ref().and_then(Keeper::failure));
+        } else {
+            (outputs, failures) = audience.output.write_somewhere(&outcome.picture);
+            if let (Some(kept), true) = (&kept, outputs.is_empty()) {
+                let how =
+                    format!("the picture is made again, and nothing else, by --resume {} -o FILE", kept.display());
+                failures.push(how);
+            }
+        }
+        if let Some(agreement) = &outcome.agreement {
+            audience.progress.say(&agreement.in_words());
+        }
+        let summary = Summary {
+            status: outcome.status,
+            health: outcome.health,
+            outputs: outputs.into_iter().chain(kept).collect(),
+            interrupted: outcome.interrupted,
+            warnings: warnings.into_iter().chain(outcome.warnings).collect(),
+        };
+        audience.finished(&summary);
+        if failures.is_empty() { Ok(summary) } else { Err(Failure::Running(failures)) }
+    }
 }
 
 /// What --strict has to say of a bad run.
-fn untrusted(health: &Health) -> Option<Failure> {
+pub(super) fn untrusted(health: &Health) -> Option<Failure> {
     let bad = health.findings.iter().filter(|finding| finding.verdict == Verdict::Bad);
     let reasons: Vec<String> = bad.map(|finding| format!("--strict: {}", finding.what)).collect();
     (!reasons.is_empty()).then_some(Failure::Exceeded(reasons))
@@ -202,7 +256,48 @@ fn elsewhere(resumed: &Resumed, opened: &Opened) -> Result<Option<String>, Failu
     )))
 }
 
+/// The command line as other subcommands' files have it.
+#[derive(Parser)]
+#[command(name = "relt render", no_binary_name = true)]
+struct Line {
+    #[command(flatten)]
+    render: Render,
+}
+
+/// Names of all options without their dashes, and whether each is given or not rather than having a value.
+pub(super) fn options() -> Vec<(String, bool)> {
+    let flag = |option: &Arg| matches!(option.get_action(), ArgAction::SetTrue);
+    let option = |option: &Arg| Some((option.get_long()?.to_owned(), flag(option)));
+    Line::command().get_arguments().filter_map(option).collect()
+}
+
 impl Render {
+    /// What these words of a command line ask for, the scene among them; or what is wrong with them, without hints about the
+    /// command line, of which there is none.
+    pub(super) fn of_words(words: impl IntoIterator<Item = String>) -> Result<Render, String> {
+        let first = |error: clap::Error| {
+            let text = error.render().to_string();
+            let end = ["\n\nUsage:", "\n\nFor more information"].iter().filter_map(|hint| text.find(hint)).min();
+            text[..end.unwrap_or(text.len())].trim_start_matches("error: ").trim().to_owned()
+        };
+        Line::try_parse_from(words).map(|line| line.render).map_err(first)
+    }
+
+    /// All that can be settled before the scene is read; the run's files are claimed.
+    pub(super) fn plan(self) -> Result<Planned, Failure> {
+        let keep = self.keep();
+        let (resumed, told) = self.resumed(keep.as_deref())?;
+        let settings = self.settings(resumed.as_ref().map(|resumed| &resumed.header.start.settings))?;
+        let is_part = settings.parts.only.is_some();
+        // a part has nothing to show but what it keeps
+        let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
+        let output = self.output(keep.as_deref(), resumed.is_some(), is_part)?;
+        let images = output.files().into_iter().filter(|_| !is_part);
+        let claims = images.chain(keep.clone()).map(|file| claim(&file)).collect::<Result<Vec<_>, _>>();
+        let claims = claims.map_err(Failure::input)?.into_iter().flatten().collect();
+        Ok(Planned { arguments: self, keep, resumed, told, settings, output, _claims: claims })
+    }
+
     fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {
             (true, _) => Verbosity::Quiet,
@@ -212,7 +307,7 @@ impl Render {
     }
 
     /// Where checkpoints go, if there are to be any.
-    fn keep(&self) -> Option<PathBuf> {
+    pub(super) fn keep(&self) -> Option<PathBuf> {
         let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some() || self.part.is_some();
         let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
         let beside = || {
@@ -338,11 +433,11 @@ fn default_output(scene: &Path) -> PathBuf {
 
 /// All who follow a run: the person, the log, and the image file of snapshots.
 struct Audience<'a> {
-    progress: Progress,
+    progress: &'a dyn Teller,
     log: Option<Log>,
     snapshots: Option<Interval>,
     keeper: Option<Keeper>,
-    output: &'a Output,
+    output: Output,
 }
 
 /// When something that happens at an interval is due.
@@ -480,6 +575,7 @@ impl Observer for Audience<'_> {
 
     fn ended(&self, checkpoint: &Checkpoint) {
         self.keep(checkpoint, true);
+        self.progress.ended(checkpoint);
     }
 
     fn finished(&self, summary: &Summary) {

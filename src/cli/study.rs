@@ -1,13 +1,13 @@
 //! `relt study`: error against run time of many methods on many scenes, from a small file to a report.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-use clap::{Args, Parser};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use clap::Args;
 
+use super::display::{Display, in_words};
 use super::failure::Failure;
 use super::{render, signals};
 use crate::film::file::{FileError, write_whole};
@@ -88,21 +88,8 @@ impl StudyArguments {
 
 /// From options of a method to settings, by the command line of `relt render` itself.
 fn parse_options(words: &[String]) -> Result<Settings, String> {
-    #[derive(Parser)]
-    #[command(name = "relt render", no_binary_name = true)]
-    struct Line {
-        #[command(flatten)]
-        render: render::Render,
-    }
     let line = ["scene.xml".to_owned()].into_iter().chain(words.iter().cloned());
-    // the message without hints about the command line, of which there is none
-    let first = |error: clap::Error| {
-        let text = error.render().to_string();
-        let end = ["\n\nUsage:", "\n\nFor more information"].iter().filter_map(|hint| text.find(hint)).min();
-        text[..end.unwrap_or(text.len())].trim_start_matches("error: ").trim().to_owned()
-    };
-    let line = Line::try_parse_from(line).map_err(first)?;
-    line.render.settings(None).map_err(|failure| failure.to_string().replace("error: ", ""))
+    render::Render::of_words(line)?.settings(None).map_err(|failure| failure.plain())
 }
 
 /// All runs that are not finished yet.
@@ -217,55 +204,6 @@ fn list(study: &Study, jobs: &[StudyJob], folder: &Path) -> Result<(), Failure> 
     Ok(())
 }
 
-/// A time to two places, as people say it.
-fn in_words(time: Duration) -> String {
-    match time.as_secs_f64() {
-        seconds @ ..100.0 => format!("{seconds:.0} s"),
-        seconds @ ..6000.0 => format!("{:.0} min", seconds / 60.0),
-        seconds => format!("{:.1} h", seconds / 3600.0),
-    }
-}
-
-/// What the person sees.
-enum Display {
-    Quiet,
-    /// A line that is drawn again and again.
-    Terminal(ProgressBar),
-    /// A line for each finished run.
-    Plain,
-}
-
-impl Display {
-    fn new(quiet: bool) -> Display {
-        match (quiet, io::stderr().is_terminal()) {
-            (true, _) => Display::Quiet,
-            (_, false) => Display::Plain,
-            _ => {
-                let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr());
-                bar.set_style(ProgressStyle::with_template("{bar:24} {msg}").expect("a template known to be right"));
-                Display::Terminal(bar)
-            }
-        }
-    }
-
-    /// Words that stay.
-    fn say(&self, words: &str) {
-        match self {
-            Display::Quiet => {}
-            Display::Terminal(bar) => bar.suspend(|| drop(writeln!(io::stderr(), "{words}"))),
-            Display::Plain => drop(writeln!(io::stderr(), "{words}")),
-        }
-    }
-
-    /// A run is over.
-    fn done(&self, words: &str) {
-        match self {
-            Display::Terminal(bar) => bar.set_position(0),
-            display => display.say(words),
-        }
-    }
-}
-
 /// Shows the run at work.
 struct Line<'a> {
     display: &'a Display,
@@ -277,14 +215,16 @@ struct Line<'a> {
 
 impl Observer for Line<'_> {
     fn progress(&self, status: &Status) {
-        let Display::Terminal(bar) = self.display else { return };
-        bar.set_position((1000.0 * status.fraction()) as u64);
+        if !matches!(self.display, Display::Terminal(_)) {
+            return;
+        }
         let left = self
             .coming
             .zip(status.time_left())
             .map(|(coming, now)| format!("\n{} left in all", in_words(coming + now)));
         let stopping = if self.stop.load(Relaxed) { ", stopping" } else { "" };
-        bar.set_message(format!("{}{stopping}{}", self.heading, left.unwrap_or_default()));
+        let words = format!("{}{stopping}{}", self.heading, left.unwrap_or_default());
+        self.display.show(status.fraction(), words);
     }
 }
 
@@ -332,11 +272,5 @@ mod tests {
         pace.took(&a, Duration::from_secs(6));
         pace.took(&c, Duration::from_secs(20));
         assert_eq!(pace.time_of(&study, &[&a, &b, &c]), Some(Duration::from_secs(30)));
-    }
-
-    #[test]
-    fn times_read_well() {
-        let words = [3.2, 99.0, 150.0, 7200.0].map(|seconds| in_words(Duration::from_secs_f64(seconds)));
-        assert_eq!(words, ["3 s", "99 s", "2 min", "2.0 h"]);
     }
 }

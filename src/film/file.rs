@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all.
 
 use std::fmt;
-use std::fs::File;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -124,6 +124,57 @@ pub fn write_somewhere(path: &Path, write: impl Fn(&Path) -> Result<(), FileErro
 /// Finds out now whether [`write_whole`] will be able to write `path`; leaves nothing behind.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     create_beside(path).map(drop)
+}
+
+/// A file that no other relt writes as long as this lives; see [`claim`].
+#[derive(Debug)]
+pub struct Claim {
+    lock: PathBuf,
+    _file: File,
+}
+
+/// Claims a file for this process, by a lock on `.NAME.lock` beside it, which the system gives back whatever becomes of the
+/// process. `None` where the file system has no locks.
+pub fn claim(path: &Path) -> Result<Option<Claim>, FileError> {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".lock");
+    let lock = path.with_file_name(name);
+    loop {
+        let Ok(file) = OpenOptions::new().write(true).create(true).truncate(false).open(&lock) else {
+            return Ok(None);
+        };
+        match file.try_lock() {
+            // who had it before may have taken it away in the meantime
+            Ok(()) if is_at(&file, &lock) => return Ok(Some(Claim { lock, _file: file })),
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(FileError::write(path, "another relt is at work on it"));
+            }
+            Err(TryLockError::Error(_)) => return Ok(None),
+        }
+    }
+}
+
+/// Whether the path still leads to the file.
+fn is_at(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let place = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+        file.metadata().map(place).ok() == path.metadata().map(place).ok()
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        path.exists()
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        drop(std::fs::remove_file(&self.lock)); // left behind it would only be in the way of eyes
+    }
 }
 
 fn create_beside(path: &Path) -> Result<NamedTempFile, FileError> {

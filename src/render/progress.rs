@@ -23,6 +23,12 @@ pub enum Verbosity {
     Verbose,
 }
 
+/// Who shows a run to a person.
+pub trait Teller: Observer {
+    /// A line that stays.
+    fn say(&self, words: &str);
+}
+
 /// Shows a run on standard error.
 pub struct Progress {
     stop: Arc<AtomicBool>,
@@ -84,9 +90,10 @@ impl Progress {
         };
         Progress { stop, display, table: Table::of(verbosity) }
     }
+}
 
-    /// A line that stays.
-    pub fn say(&self, words: &str) {
+impl Teller for Progress {
+    fn say(&self, words: &str) {
         match &self.display {
             Display::Quiet => {}
             Display::Terminal(bar) => bar.suspend(|| drop(writeln!(io::stderr(), "{words}"))),

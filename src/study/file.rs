@@ -35,6 +35,7 @@ use serde::Deserialize;
 use toml::{Spanned, Table, Value};
 
 use super::results::{Clock, Stage};
+use super::words::{Choice, grid, place, tidy, values, word};
 use crate::film::file::FileError;
 use crate::load::{self, LoadError, Reach, Watch};
 use crate::render::Settings;
@@ -200,9 +201,6 @@ const NOT_OPTIONS: [&str; 15] = [
     "verbose",
     "layers",
 ];
-/// Options whose value is itself a list: a list of lists varies them.
-const LISTS: [&str; 1] = ["betas"];
-
 /// Reads a study file; `parse` knows the options of methods.
 pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
     let text = std::fs::read_to_string(path).map_err(|error| FileError::read(path, error))?;
@@ -216,14 +214,6 @@ pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
         (Some(study), faults) if faults.is_empty() => Ok(study),
         (_, faults) => Err(StudyError::Content(faults)),
     }
-}
-
-/// `file:line:column` of the start of a span.
-fn place(path: &Path, text: &str, span: Range<usize>) -> String {
-    let before = &text[..span.start.min(text.len())];
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
-    format!("{}:{line}:{column}", path.display())
 }
 
 /// Gathers all that is wrong with a file.
@@ -473,50 +463,6 @@ impl Reader<'_> {
     }
 }
 
-/// An option with one of its values.
-#[derive(Clone, Debug)]
-struct Choice {
-    name: String,
-    value: Value,
-    /// It is one of several.
-    varied: bool,
-}
-
-impl Choice {
-    /// As on a command line.
-    fn words(&self) -> Vec<String> {
-        match &self.value {
-            Value::Boolean(true) => vec![format!("--{}", self.name)],
-            Value::Boolean(false) => Vec::new(),
-            value => vec![format!("--{}", self.name), word(value).unwrap_or_default()],
-        }
-    }
-}
-
-/// The values that an option is to take; `None` where they are of no use on a command line.
-fn values(name: &str, value: &Value) -> Option<Vec<Value>> {
-    let is_value = |value: &Value| match value {
-        Value::Array(list) => LISTS.contains(&name) && list.iter().all(|item| !item.is_array() && word(item).is_some()),
-        value => word(value).is_some(),
-    };
-    match value {
-        value if is_value(value) => Some(vec![value.clone()]),
-        Value::Array(list) if !list.is_empty() && list.iter().all(is_value) => Some(list.clone()),
-        _ => None,
-    }
-}
-
-/// All combinations, the last option varying fastest.
-fn grid(axes: &[(String, Vec<Value>)]) -> Vec<Vec<Choice>> {
-    axes.iter().fold(vec![Vec::new()], |combinations, (name, values)| {
-        let with = |combination: &Vec<Choice>, value: &Value| {
-            let choice = Choice { name: name.clone(), value: value.clone(), varied: values.len() > 1 };
-            combination.iter().cloned().chain([choice]).collect()
-        };
-        combinations.iter().flat_map(|combination| values.iter().map(move |value| with(combination, value))).collect()
-    })
-}
-
 /// The name with `{option}` filled in; varied options that it does not mention stand behind it.
 fn full_name(name: Option<&str>, method: &str, options: &[Choice], variant: &[(String, String)]) -> String {
     let template = name.unwrap_or(method);
@@ -527,34 +473,6 @@ fn full_name(name: Option<&str>, method: &str, options: &[Choice], variant: &[(S
     let unmentioned = variant.iter().filter(|(option, _)| !template.contains(&format!("{{{option}}}")));
     let unmentioned = unmentioned.filter(|(option, value)| !(option == "method" && value == template));
     unmentioned.fold(full, |full, (option, value)| format!("{full}, {option} {value}"))
-}
-
-/// A value as it stands on a command line; lists have commas between.
-fn word(value: &Value) -> Option<String> {
-    match value {
-        Value::String(text) => Some(text.clone()),
-        Value::Integer(number) => Some(number.to_string()),
-        Value::Float(number) => Some(number.to_string()),
-        Value::Boolean(flag) => Some(flag.to_string()),
-        Value::Array(list) => list.iter().map(word).collect::<Option<Vec<_>>>().map(|words| words.join(",")),
-        _ => None,
-    }
-}
-
-/// The path without `name/..`, to be read by people.
-fn tidy(path: &Path) -> PathBuf {
-    use std::path::Component;
-    let mut tidied = PathBuf::new();
-    for component in path.components() {
-        match (component, tidied.components().next_back()) {
-            (Component::ParentDir, Some(Component::Normal(name))) if !tidied.join(name).is_symlink() => {
-                tidied.pop();
-            }
-            (Component::CurDir, _) => {}
-            _ => tidied.push(component),
-        }
-    }
-    tidied
 }
 
 impl StudyScene {

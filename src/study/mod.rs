@@ -18,6 +18,7 @@ pub mod run_log;
 pub mod runner;
 pub mod statistics;
 mod svg;
+pub(crate) mod words;
 
 /// A name as a part of a file's name: letters and digits in lower case, all else as one dash.
 fn file_name(name: &str) -> String {
