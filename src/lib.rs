@@ -36,6 +36,7 @@ pub mod film;
 pub mod load;
 pub mod math;
 pub mod path;
+pub mod ranks;
 pub mod render;
 pub mod rng;
 pub mod sample;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf, absolute};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -13,12 +12,13 @@ use super::run_options::RunOptions;
 use super::scene::{Opened, SceneArguments};
 use super::{signals, values};
 use crate::film::file::{FileError, check_writable};
+use crate::ranks::{Company, Talk};
 use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Verbosity};
 use crate::render::{
     self, Checkpoint, Health, Job, Observer, Output, PacketChoice, Parts, Picture, Resumed, RunStart, Settings, Status,
-    Summary, Verdict, checkpoint, replay,
+    Summary, Verdict, allocation, checkpoint, replay, shared,
 };
 use crate::tempering::RoundReport;
 
@@ -76,9 +76,10 @@ pub(super) struct Render {
     layers: bool,
 
     /// Renders one of N independent parts of the job, each with its own random numbers and 1/N of --mpp, into a file that
-    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is
+    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is; slurm/N, hq/N, auto/N: the
+    /// part with the number of the task of SLURM, of HyperQueue, of either
     #[arg(long, value_name = "I/N", value_parser = values::part, allow_hyphen_values = true, help_heading = "Parts")]
-    part: Option<Parts>,
+    part: Option<values::Part>,
 
     /// Renders all of N independent parts and makes one image of them, the same that relt merge would
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Parts")]
@@ -98,14 +99,35 @@ const WORTH_TELLING: u64 = 1 << 30;
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
+    let company = Company::of_processes();
+    let done = on_ranks(arguments, company.as_ref());
+    if let (Err(failure), Some(company)) = (&done, &company) {
+        eprint!("{failure}");
+        company.abort(failure.number().into());
+    }
+    done
+}
+
+/// The run, together with other ranks where there are any.
+fn on_ranks(mut arguments: Render, company: Option<&Arc<Company>>) -> Result<(), Failure> {
     let keep = arguments.keep();
+    let leads = company.is_none_or(|company| company.is_first());
+    if !leads {
+        arguments.quieten();
+    }
     let (resumed, told) = arguments.resumed(keep.as_deref())?;
     let header = resumed.as_ref().map(|resumed| &resumed.header);
     let settings = arguments.settings(header.map(|header| &header.start.settings))?;
+    if company.is_some() {
+        let faults = shared::faults(&settings);
+        if !faults.is_empty() {
+            return Err(Failure::Input(faults));
+        }
+    }
     let is_part = settings.parts.only.is_some();
     // a part has nothing to show but what it keeps
     let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
-    let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part)?;
+    let output = arguments.output(keep.as_deref(), resumed.is_some(), is_part || !leads)?;
     // from now on, also while the scene is read, the signal is no longer the end
     let asked = keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
     let description = arguments.scene.describe(settings.threads, arguments.quiet)?;
@@ -113,7 +135,7 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     if let Some(fault) = memory::available().and_then(|available| memory.fault(available)) {
         return Err(Failure::input(fault));
     }
-    let is_kept = keep.is_some() || resumed.is_some();
+    let is_kept = keep.is_some() || resumed.is_some() || company.is_some();
     let scene_digest = if is_kept { checkpoint::scene_digest(&description) } else { String::new() };
     resumed.iter().try_for_each(|resumed| resumed.agrees(&scene_digest, &settings)).map_err(Failure::input)?;
     let opened = Opened::of(description, settings.threads, arguments.quiet)?;
@@ -129,6 +151,9 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     if memory.most >= WORTH_TELLING {
         progress.say(&format!("film: {}", memory.in_words()));
     }
+    if let Some(values::Part { parts, by: Some(by) }) = &arguments.part {
+        progress.say(&format!("{} by {by}", parts.in_words().unwrap_or_default()));
+    }
     for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
         progress.say(&format!("warning: {warning}"));
     }
@@ -139,7 +164,11 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
 
     let scene_name = arguments.scene.path.display().to_string();
     let job = Job { scene: &opened.scene, scene_name, settings, stop: &stop };
-    let mut outcome = render::run_from(&job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
+    let outcome = render::run_on(company, &job, &scene_digest, resumed, &audience).map_err(Failure::running)?;
+    let Some(mut outcome) = outcome else { return Ok(()) };
+    if let Some(company) = company {
+        audience.progress.say(&talk_in_words(company, outcome.status.elapsed));
+    }
     if let Some(fault) = outcome.status.faults.first() {
         let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
         let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
@@ -169,6 +198,18 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     failure.map_or(Ok(()), Err)
 }
 
+/// `on 4 ranks: rank 0 spent 0.21 s (3 %) talking and waiting, in 120 exchanges of 12.3 MB`
+fn talk_in_words(company: &Company, elapsed: Duration) -> String {
+    let Talk { time, bytes, messages } = company.talk();
+    format!(
+        "on {} ranks: rank 0 spent {:.2} s ({:.0} %) talking and waiting, in {messages} exchanges of {:.1} MB",
+        company.count(),
+        time.as_secs_f64(),
+        100.0 * time.as_secs_f64() / elapsed.as_secs_f64(),
+        bytes as f64 / 1e6
+    )
+}
+
 /// What --strict has to say of a bad run.
 fn untrusted(health: &Health) -> Option<Failure> {
     let bad = health.findings.iter().filter(|finding| finding.verdict == Verdict::Bad);
@@ -196,6 +237,12 @@ fn elsewhere(resumed: &Resumed, opened: &Opened) -> Result<Option<String>, Failu
 }
 
 impl Render {
+    /// Leaves to the first rank what it alone does: to talk and to write.
+    fn quieten(&mut self) {
+        (self.quiet, self.verbose, self.strict) = (true, false, false);
+        (self.snapshot, self.log) = (None, None);
+    }
+
     fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {
             (true, _) => Verbosity::Quiet,
@@ -209,7 +256,7 @@ impl Render {
         let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some() || self.part.is_some();
         let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
         let beside = || {
-            let of = self.part.and_then(|parts| Some((parts.only?, parts.of)));
+            let of = self.part.as_ref().and_then(|part| Some((part.parts.only?, part.parts.of)));
             let extension = of.map_or("checkpoint".into(), |(part, of)| format!("{part}-of-{of}.part"));
             self.output_name().with_extension(extension)
         };
@@ -248,8 +295,8 @@ impl Render {
     pub(super) fn settings(&self, before: Option<&Settings>) -> Result<Settings, Failure> {
         let base = before.cloned().unwrap_or_default();
         let settings = Settings {
-            parts: match (self.part, self.parts) {
-                (Some(part), _) => part,
+            parts: match (&self.part, self.parts) {
+                (Some(part), _) => part.parts,
                 (None, Some(of)) => Parts { of, only: None },
                 (None, None) => base.parts,
             },
@@ -277,7 +324,7 @@ impl Render {
         if settings.parts.only.is_some() && self.snapshot.is_some() {
             faults.push("--snapshot: a part has no image; relt merge makes one of its file at any time".into());
         }
-        let cores = available_parallelism().map_or(1, usize::from);
+        let cores = allocation::threads();
         if let Some(threads) = self.run.threads.filter(|threads| self.pin && *threads > cores) {
             faults.push(format!("--pin: {threads} threads cannot have a core each, relt may use {cores}"));
         }
