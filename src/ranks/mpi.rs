@@ -76,6 +76,8 @@ impl Ranks for World {
 
     fn everywhere(&self, own: &[u8]) -> Vec<Vec<u8>> {
         let world = world();
+        // never empty: a vector of nothing points to address 1, by which MPI means that there is nothing to send
+        let own = [own, &[0]].concat();
         let mut lengths = vec![0u64; self.count];
         world.all_gather_into(&(own.len() as u64), &mut lengths[..]);
         let all: u64 = lengths.iter().sum();
@@ -84,9 +86,13 @@ impl Ranks for World {
         let places: Vec<i32> =
             counts.iter().scan(0, |place, count| Some(std::mem::replace(place, *place + count))).collect();
         let mut bytes = vec![0u8; all as usize];
-        world.all_gather_varcount_into(own, &mut PartitionMut::new(&mut bytes[..], counts, places));
+        world.all_gather_varcount_into(&own[..], &mut PartitionMut::new(&mut bytes[..], counts, places));
         let mut rest = &bytes[..];
-        lengths.iter().map(|length| rest.split_off(..*length as usize).expect("a sum of lengths").to_vec()).collect()
+        let one = |length: &u64| {
+            let bytes = rest.split_off(..*length as usize).expect("a sum of lengths");
+            bytes[..bytes.len() - 1].to_vec()
+        };
+        lengths.iter().map(one).collect()
     }
 
     fn of_first(&self, own: Vec<u8>) -> Vec<u8> {

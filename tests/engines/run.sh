@@ -145,9 +145,8 @@ C
     rm -f image.* task.*
     submit --array=1-$parts >id
     await rendering 1; await some_part
-    kill -9 $(renders)
+    kill -9 $(renders) 2>/dev/null
     await over
-    say "        after kill -9 of all that ran: $(ls image.*.part | wc -l) parts begun; merge says: $("$RELT" merge image.*.part -o image.exr 2>&1 | grep -i missing | head -1)"
     PARTS=$parts submit --array=1-$parts >id
     await over
     holds "tasks killed with kill -9, submitted again by their numbers: same bits" eval 'merged && went_on task.*.log'
@@ -155,15 +154,21 @@ C
     rm -f image.* task.*
     local id; id=$(submit --array=1-$parts)
     await rendering 1; await some_part
-    scontrol requeue "$id"_1 >requeue.log 2>&1
-    kill -9 $controller; sleep 1
+    # what SLURM does two minutes before the end of the time
+    scancel --signal=USR2 --batch "${id}_1" >requeue.log 2>&1
+    await grep -q interrupted task.1.log
+    sleep 6 # the controller saves its state every five seconds
+    kill -9 $controller; wait $controller 2>/dev/null
     slurmctld -D -f slurm.conf >controller.log 2>&1 & controller=$!; started+=($controller)
-    sleep 3
-    # a requeued task waits for two minutes unless it is let go
     await eval 'squeue -h >/dev/null 2>&1'
-    for _ in 1 2 3 4 5; do scontrol update JobId="${id}_1" StartTime=now >>requeue.log 2>&1; sleep 1; done
-    for _ in 1 2 3; do await over && break; done
-    holds "a task requeued amid its part and the controller killed and started again: same bits" eval 'merged && went_on task.1.log'
+    # a requeued task waits for two minutes unless it is let go
+    for _ in $(seq 60); do
+        over && break
+        scontrol update JobId="${id}_1" StartTime=now >>requeue.log 2>&1
+        sleep 1
+    done
+    holds "a task near the end of its time requeues itself, and the controller is killed and started again: same bits" \
+        eval 'merged && went_on task.1.log'
     cd "$scratch"
 }
 
@@ -203,10 +208,15 @@ faults() {
     "${run[@]}" --part 2/$parts >2.log 2>&1
     "${run[@]}" --part 3/$parts >3.log 2>&1
     holds "parts without an engine: same bits" merged
+    cp image.2-of-$parts.part.previous kept
     truncate -s -100 image.2-of-$parts.part
     "$RELT" merge image.*-of-$parts.part -o image.exr >merge.log 2>&1
-    holds "a part that is cut off is refused by its name" grep -q "image.2-of-$parts.part" merge.log
+    holds "of a part that is cut off the one before it is taken" grep -q "image.2-of-$parts.part.previous" merge.log
+    rm image.2-of-$parts.part.previous
+    "$RELT" merge image.*-of-$parts.part -o none.exr >merge.log 2>&1
+    holds "and where there is none it is refused by its name" eval '! [ -e none.exr ] && grep -q "error: image.2-of" merge.log'
     say "        $(grep -m1 image.2 merge.log)"
+    mv kept image.2-of-$parts.part.previous
     "${run[@]}" --part 2/$parts >2.log 2>&1
     holds "and made whole from the one before it" eval 'merged && went_on 2.log'
 
