@@ -37,12 +37,16 @@ clean() {
 trap clean EXIT
 
 # Waits until the command holds, a minute at most.
-await() { for _ in $(seq 600); do "$@" && return; sleep 0.1; done; return 1; }
+await() { local end=$((SECONDS + 60)); until "$@"; do [ $SECONDS -lt $end ] || return 1; sleep 0.1; done; }
 same() { "$RELT" compare --reference "$scratch/whole.exr" "$1" 2>&1 | grep -q "^$1 *0 *0 *0 *1.0000 *0.0000"; }
 merged() { "$RELT" merge image.*-of-$parts.part -o image.exr >merge.log 2>&1 && same image.exr; }
 went_on() { grep -l "going on after" "$@" >/dev/null 2>&1; }
 # Processes of this script's relt that render in this folder.
-renders() { for p in /proc/[0-9]*; do [ "$(readlink "$p/exe")" = "$(readlink -f "$RELT")" ] && [ "$(readlink "$p/cwd")" = "$PWD" ] && echo "${p#/proc/}"; done; true; }
+renders() {
+    local pid
+    for pid in $(pgrep -f "^$RELT render"); do [ "$(readlink "/proc/$pid/cwd")" = "$PWD" ] && echo "$pid"; done
+    true
+}
 rendering() { [ "$(renders | wc -l)" -ge "$1" ]; }
 none_rendering() { [ -z "$(renders)" ]; }
 folder() { mkdir -p "$scratch/$1" && cd "$scratch/$1" || exit 1; say; say "== $1"; }
