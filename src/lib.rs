@@ -38,6 +38,7 @@ pub mod load;
 pub mod math;
 pub(crate) mod memory;
 pub mod path;
+pub mod ranks;
 pub mod render;
 pub mod rng;
 pub mod sample;

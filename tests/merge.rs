@@ -194,9 +194,11 @@ fn senseless_parts_are_refused() {
         (&["--part", "1/2", "--parts", "2"], "give one of them"),
         (&["--part", "1/2", "--snapshot", "1s"], "--snapshot: a part has no image"),
         (&["--part", "slurm"], "SLURM_ARRAY_TASK_ID is not set"),
+        (&["--part", "hq/3"], "HQ_TASK_ID is not set"),
+        (&["--part", "auto/3"], "this is no task of an array"),
     ] {
         let mut command = render(folder.path(), "cornell-box", options);
-        command.env_remove("SLURM_ARRAY_TASK_ID");
+        command.env_remove("SLURM_ARRAY_TASK_ID").env_remove("HQ_TASK_ID");
         let text = ended(&mut command, 2);
         assert!(text.contains(part), "{options:?}: {part:?} is not in {text}");
     }
@@ -206,7 +208,15 @@ fn senseless_parts_are_refused() {
     let mut command = render(folder.path(), "cornell-box", &options);
     command.envs(array.map(|(name, value)| (format!("SLURM_ARRAY_TASK_{name}"), value)));
     let text = done(&mut command);
-    assert!(text.contains("part 3 of 4") && text.contains("wrote whole.3-of-4.part"), "{text}");
+    assert!(text.contains("part 3 of 4 by SLURM_ARRAY_TASK_ID 2"), "{text}");
+    assert!(text.contains("wrote whole.3-of-4.part"), "{text}");
+    // as a task of HyperQueue that was given one core
+    let options = ["--part", "auto/4", "--mpp", "8", "--mapping", "unidirectional", "-o", "whole.exr"];
+    let mut command = render(folder.path(), "cornell-box", &options);
+    command.env_remove("SLURM_ARRAY_TASK_ID").envs([("HQ_TASK_ID", "4"), ("HQ_CPUS", "1")]);
+    let text = done(&mut command);
+    assert!(text.contains("part 4 of 4 by HQ_TASK_ID 4"), "{text}");
+    assert!(text.contains("wrote whole.4-of-4.part"), "{text}");
 }
 
 /// With the box filter and camera paths alone a pixel of a path tracer is the mean of its points, and `density` counts them:

@@ -48,11 +48,16 @@ impl Failure {
     }
 
     pub fn code(&self) -> ExitCode {
+        ExitCode::from(self.number())
+    }
+
+    /// The exit code's number.
+    pub fn number(&self) -> u8 {
         match self {
-            Failure::Running(_) => ExitCode::from(1),
-            Failure::Input(_) | Failure::Shown { .. } => ExitCode::from(2),
-            Failure::Exceeded(_) => ExitCode::from(3),
-            Failure::Interrupted(_) => ExitCode::from(signals::ENDED as u8),
+            Failure::Running(_) => 1,
+            Failure::Input(_) | Failure::Shown { .. } => 2,
+            Failure::Exceeded(_) => 3,
+            Failure::Interrupted(_) => signals::ENDED as u8,
         }
     }
 }

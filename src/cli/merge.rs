@@ -47,12 +47,13 @@ pub(super) fn run(arguments: Merge) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `part 3 of 8: 12.3 M mutations in 3 min 05 s (a.3-of-8.part)`
+/// `part 3 of 8: 12.3 M of 20.0 M mutations in 3 min 05 s (a.3-of-8.part)`
 fn line(part: &MergedPart, of: u32) -> String {
     let what = match part.number {
         Some(number) => format!("part {number} of {of}"),
         None => "the whole".into(),
     };
     let (mutations, time) = (with_unit(part.mutations as f64), rough(part.elapsed));
-    format!("{what}: {mutations} mutations in {time} ({})", part.path.display())
+    let wanted = part.wanted.map_or_else(String::new, |wanted| format!(" of {}", with_unit(wanted as f64)));
+    format!("{what}: {mutations}{wanted} mutations in {time} ({})", part.path.display())
 }

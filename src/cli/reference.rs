@@ -66,7 +66,7 @@ pub(super) struct Reference {
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
 
-    /// Worker threads, from 1 [default: as many as the machine runs at once]; the reference does not depend on it
+    /// Worker threads, from 1 [default: as render]; the reference does not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     threads: Option<usize>,
 

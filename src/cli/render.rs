@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf, absolute};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use clap::{Arg, ArgAction, Args, CommandFactory, Parser};
@@ -13,12 +12,13 @@ use super::run_options::RunOptions;
 use super::scene::{Opened, SceneArguments, number_of_threads};
 use super::{signals, values};
 use crate::film::file::{Claim, check_writable, claim, write_somewhere};
+use crate::ranks::{Company, Talk};
 use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Teller, Verbosity};
 use crate::render::{
     self, Checkpoint, Health, Job, Observer, Outcome, Output, PacketChoice, Parts, Picture, Resumed, RunStart,
-    Settings, Status, Summary, Verdict, checkpoint, replay,
+    Settings, Status, Summary, Verdict, allocation, checkpoint, replay, shared,
 };
 use crate::scene::description::FilmDescription;
 use crate::tempering::RoundReport;
@@ -77,9 +77,10 @@ pub(super) struct Render {
     layers: bool,
 
     /// Renders one of N independent parts of the job, each with its own random numbers and 1/N of --mpp, into a file that
-    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is
+    /// relt merge makes the image of; slurm: the task of a SLURM job array that this process is; slurm/N, hq/N, auto/N: the
+    /// part with the number of the task of SLURM, of HyperQueue, of either
     #[arg(long, value_name = "I/N", value_parser = values::part, allow_hyphen_values = true, help_heading = "Parts")]
-    part: Option<Parts>,
+    part: Option<values::Part>,
 
     /// Renders all of N independent parts and makes one image of them, the same that relt merge would
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Parts")]
@@ -99,8 +100,22 @@ const WORTH_TELLING: u64 = 1 << 30;
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
+    let company = Company::of_processes();
+    let done = on_ranks(arguments, company.clone());
+    if let (Err(failure), Some(company)) = (&done, &company) {
+        eprint!("{failure}");
+        company.abort(failure.number().into());
+    }
+    done
+}
+
+/// The run, together with other ranks where there are any.
+fn on_ranks(mut arguments: Render, company: Option<Arc<Company>>) -> Result<(), Failure> {
+    if company.as_ref().is_some_and(|company| !company.is_first()) {
+        arguments.quieten();
+    }
     let (verbosity, strict) = (arguments.verbosity(), arguments.strict);
-    let planned = arguments.plan()?;
+    let planned = arguments.plan(company)?;
     // from now on, also while the scene is read, the signal is no longer the end
     let asked = planned.keep.as_ref().map(|_| signals::checkpoint_flag()).transpose()?;
     let (threads, quiet) = (planned.settings.threads, verbosity == Verbosity::Quiet);
@@ -110,7 +125,8 @@ pub(super) fn run(arguments: Render) -> Result<(), Failure> {
     let opened = Opened::of(description, threads, quiet)?;
     let stop = signals::stop_flag()?;
     let progress = Progress::new(verbosity, stop.clone());
-    let summary = planned.render(&opened, &scene_digest, asked, &stop, &progress)?.finish()?;
+    let Some(rendered) = planned.render(&opened, &scene_digest, asked, &stop, &progress)? else { return Ok(()) };
+    let summary = rendered.finish()?;
     strict.then(|| untrusted(&summary.health)).flatten().map_or(Ok(()), Err)
 }
 
@@ -124,6 +140,8 @@ pub(super) struct Planned {
     told: Option<String>,
     pub settings: Settings,
     output: Output,
+    /// The ranks that do it together, where there are others.
+    company: Option<Arc<Company>>,
     _claims: Vec<Claim>,
 }
 
@@ -138,9 +156,9 @@ pub(super) struct Rendered<'a> {
 }
 
 impl Planned {
-    /// Whether the run leaves a checkpoint or goes on from one, so that its scene must be told from others.
+    /// Whether the run leaves a checkpoint, goes on from one or has company, so that its scene must be told from others.
     pub fn is_kept(&self) -> bool {
-        self.keep.is_some() || self.resumed.is_some()
+        self.keep.is_some() || self.resumed.is_some() || self.company.is_some()
     }
 
     /// That the scene's film has room, and that the scene is that of the checkpoint.
@@ -156,7 +174,8 @@ impl Planned {
         self.resumed.iter().try_for_each(|resumed| resumed.agrees(scene_digest, &self.settings)).map_err(Failure::input)
     }
 
-    /// Renders. `asked` is raised when a signal asks for a checkpoint, `stop` to end the run early.
+    /// Renders. `asked` is raised when a signal asks for a checkpoint, `stop` to end the run early. Nothing comes of it on
+    /// other ranks than the first.
     pub fn render<'a>(
         self,
         opened: &'a Opened,
@@ -164,8 +183,8 @@ impl Planned {
         asked: Option<Arc<AtomicBool>>,
         stop: &AtomicBool,
         progress: &'a dyn Teller,
-    ) -> Result<Rendered<'a>, Failure> {
-        let Planned { arguments, keep, resumed, told, settings, output, _claims } = self;
+    ) -> Result<Option<Rendered<'a>>, Failure> {
+        let Planned { arguments, keep, resumed, told, settings, output, company, _claims } = self;
         let is_part = settings.parts.only.is_some();
         let done = resumed.as_ref().map(|resumed| resumed.header.done.clone());
         let log = arguments.log.as_deref().map(|path| match &done {
@@ -178,6 +197,9 @@ impl Planned {
         if memory.most >= WORTH_TELLING {
             progress.say(&format!("film: {}", memory.in_words()));
         }
+        if let Some(values::Part { parts, by: Some(by) }) = &arguments.part {
+            progress.say(&format!("{} by {by}", parts.in_words().unwrap_or_default()));
+        }
         for warning in opened.warnings.iter().chain(&told).chain(&arithmetic) {
             progress.say(&format!("warning: {warning}"));
         }
@@ -188,14 +210,19 @@ impl Planned {
 
         let scene_name = arguments.scene.path.display().to_string();
         let job = Job { scene: &opened.scene, scene_name, settings, stop };
-        let mut outcome = render::run_from(&job, scene_digest, resumed, &audience).map_err(Failure::running)?;
+        let company = company.as_ref();
+        let outcome = render::run_on(company, &job, scene_digest, resumed, &audience).map_err(Failure::running)?;
+        let Some(mut outcome) = outcome else { return Ok(None) };
+        if let Some(company) = company {
+            audience.progress.say(&talk_in_words(company, outcome.status.elapsed));
+        }
         if let Some(fault) = outcome.status.faults.first() {
             let (scene, width) = (arguments.scene.in_words(), opened.scene.film.width);
             let command = replay::command(&scene, &job.settings, outcome.mapping, width, &fault.evaluation);
             outcome.warnings.push(format!("the first of those paths: {command}"));
         }
         let warnings = opened.warnings.iter().cloned().chain(told).collect();
-        Ok(Rendered { outcome, audience, is_part, warnings, _claims })
+        Ok(Some(Rendered { outcome, audience, is_part, warnings, _claims }))
     }
 }
 
@@ -228,6 +255,18 @@ impl Rendered<'_> {
         audience.finished(&summary);
         if failures.is_empty() { Ok(summary) } else { Err(Failure::Running(failures)) }
     }
+}
+
+/// `on 4 ranks: rank 0 spent 0.21 s (3 %) talking and waiting, in 120 exchanges of 12.3 MB`
+fn talk_in_words(company: &Company, elapsed: Duration) -> String {
+    let Talk { time, bytes, messages } = company.talk();
+    format!(
+        "on {} ranks: rank 0 spent {:.2} s ({:.0} %) talking and waiting, in {messages} exchanges of {:.1} MB",
+        company.count(),
+        time.as_secs_f64(),
+        100.0 * time.as_secs_f64() / elapsed.as_secs_f64(),
+        bytes as f64 / 1e6
+    )
 }
 
 /// What --strict has to say of a bad run.
@@ -283,19 +322,32 @@ impl Render {
         Line::try_parse_from(words).map(|line| line.render).map_err(first)
     }
 
-    /// All that can be settled before the scene is read; the run's files are claimed.
-    pub(super) fn plan(self) -> Result<Planned, Failure> {
+    /// All that can be settled before the scene is read; the run's files are claimed. They are the first rank's where it has
+    /// company.
+    pub(super) fn plan(self, company: Option<Arc<Company>>) -> Result<Planned, Failure> {
+        let leads = company.as_ref().is_none_or(|company| company.is_first());
         let keep = self.keep();
         let (resumed, told) = self.resumed(keep.as_deref())?;
         let settings = self.settings(resumed.as_ref().map(|resumed| &resumed.header.start.settings))?;
+        let faults = if company.is_some() { shared::faults(&settings) } else { Vec::new() };
+        if !faults.is_empty() {
+            return Err(Failure::Input(faults));
+        }
         let is_part = settings.parts.only.is_some();
         // a part has nothing to show but what it keeps
         let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));
-        let output = self.output(keep.as_deref(), resumed.is_some(), is_part)?;
+        let output = self.output(keep.as_deref(), resumed.is_some(), is_part || !leads)?;
         let images = output.files().into_iter().filter(|_| !is_part);
-        let claims = images.chain(keep.clone()).map(|file| claim(&file)).collect::<Result<Vec<_>, _>>();
+        let claims =
+            images.chain(keep.clone()).filter(|_| leads).map(|file| claim(&file)).collect::<Result<Vec<_>, _>>();
         let claims = claims.map_err(Failure::input)?.into_iter().flatten().collect();
-        Ok(Planned { arguments: self, keep, resumed, told, settings, output, _claims: claims })
+        Ok(Planned { arguments: self, keep, resumed, told, settings, output, company, _claims: claims })
+    }
+
+    /// Leaves to the first rank what it alone does: to talk and to write.
+    fn quieten(&mut self) {
+        (self.quiet, self.verbose, self.strict) = (true, false, false);
+        (self.snapshot, self.log) = (None, None);
     }
 
     fn verbosity(&self) -> Verbosity {
@@ -311,7 +363,7 @@ impl Render {
         let wanted = self.checkpoint.is_some() || self.checkpoint_file.is_some() || self.part.is_some();
         let resumed = self.resume.clone().filter(|path| *path != *Path::new(AUTO));
         let beside = || {
-            let of = self.part.and_then(|parts| Some((parts.only?, parts.of)));
+            let of = self.part.as_ref().and_then(|part| Some((part.parts.only?, part.parts.of)));
             let extension = of.map_or("checkpoint".into(), |(part, of)| format!("{part}-of-{of}.part"));
             self.output_name().with_extension(extension)
         };
@@ -350,8 +402,8 @@ impl Render {
     pub(super) fn settings(&self, before: Option<&Settings>) -> Result<Settings, Failure> {
         let base = before.cloned().unwrap_or_default();
         let settings = Settings {
-            parts: match (self.part, self.parts) {
-                (Some(part), _) => part,
+            parts: match (&self.part, self.parts) {
+                (Some(part), _) => part.parts,
                 (None, Some(of)) => Parts { of, only: None },
                 (None, None) => base.parts,
             },
@@ -379,7 +431,7 @@ impl Render {
         if settings.parts.only.is_some() && self.snapshot.is_some() {
             faults.push("--snapshot: a part has no image; relt merge makes one of its file at any time".into());
         }
-        let cores = available_parallelism().map_or(1, usize::from);
+        let cores = allocation::threads();
         if let Some(threads) = self.run.threads.filter(|threads| self.pin && *threads > cores) {
             faults.push(format!("--pin: {threads} threads cannot have a core each, relt may use {cores}"));
         }

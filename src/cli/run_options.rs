@@ -75,7 +75,8 @@ pub(super) struct RunOptions {
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Budget")]
     pub seed: Option<u64>,
 
-    /// Worker threads, from 1 [default: as many as the machine runs at once]; the image does not depend on it
+    /// Worker threads, from 1 [default: as many as the machine runs at once, or SLURM or HyperQueue has given this process];
+    /// the image does not depend on it
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Machine")]
     pub threads: Option<usize>,
 }

@@ -1,7 +1,6 @@
 //! Scene files, as every subcommand takes them.
 
 use std::path::PathBuf;
-use std::thread::available_parallelism;
 
 use clap::Args;
 
@@ -10,6 +9,7 @@ use super::loading::{self, Building};
 use super::values;
 use crate::embree::Device;
 use crate::load::{self, Reach, Watch};
+use crate::render::allocation;
 use crate::scene::{Features, Scene, SceneDescription};
 
 /// A scene file and values for its parameters.
@@ -53,7 +53,7 @@ impl SceneArguments {
         std::iter::once(self.path.display().to_string()).chain(defines).chain(confine).collect()
     }
 
-    /// Reads the file and builds the scene, on so many threads or as many as the machine runs at once; shows how far that
+    /// Reads the file and builds the scene, on so many threads or as many as it may use; shows how far that
     /// is, unless `quiet`.
     pub fn open(&self, threads: Option<usize>, quiet: bool) -> Result<Opened, Failure> {
         Opened::of(self.describe(threads, quiet)?, threads, quiet)
@@ -84,7 +84,7 @@ impl Opened {
     }
 }
 
-/// The threads that are asked for, or as many as the machine runs at once.
+/// The threads that are asked for, or as many as there are for this process.
 pub(super) fn number_of_threads(threads: Option<usize>) -> usize {
-    threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from))
+    threads.unwrap_or_else(allocation::threads)
 }

@@ -53,29 +53,81 @@ pub(super) fn replicas(text: &str) -> Result<LadderChoice, String> {
     }
 }
 
-/// `3/8`, or `slurm` for the task of a job array that this process is.
-pub(super) fn part(text: &str) -> Result<Parts, String> {
-    let (only, of) = match text {
-        "slurm" => slurm_task(|name| std::env::var(name).ok())?,
-        _ => {
-            let numbers = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
-            numbers.ok_or("write it as 3/8, for part 3 of 8, or slurm for the task of a job array")?
-        }
+/// Which part of a job is meant, and what says so where that is not the command line itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Part {
+    pub parts: Parts,
+    /// `SLURM_ARRAY_TASK_ID 3`.
+    pub by: Option<String>,
+}
+
+/// `3/8`, or the task of an engine's array that this process is: `slurm`, `slurm/8`, `hq/8`, or `auto/8` for whichever.
+pub(super) fn part(text: &str) -> Result<Part, String> {
+    part_of(text, &|name| std::env::var(name).ok())
+}
+
+/// As [`part`], in that environment.
+fn part_of(text: &str, variable: &dyn Fn(&str) -> Option<String>) -> Result<Part, String> {
+    const HOW: &str = "write it as 3/8, for part 3 of 8, or slurm, slurm/8, hq/8 or auto/8 for the task of an array";
+    let (which, of) = text.split_once('/').map_or((text, None), |(which, of)| (which, Some(of)));
+    let of: Option<u32> = of.map(|of| of.parse().map_err(|_| HOW)).transpose()?;
+    let is_set = |name: &str| variable(name).is_some();
+    let engine = match which {
+        "auto" => match [SLURM_TASK, HYPERQUEUE_TASK].map(is_set) {
+            [true, false] => "slurm",
+            [false, true] => "hq",
+            [true, true] => {
+                return Err(format!(
+                    "both {SLURM_TASK} and {HYPERQUEUE_TASK} are set: say slurm or hq instead of auto"
+                ));
+            }
+            [false, false] => {
+                return Err(format!("neither {SLURM_TASK} nor {HYPERQUEUE_TASK} is set: this is no task of an array"));
+            }
+        },
+        other => other,
     };
-    Ok(Parts { of, only: Some(only) })
+    let (name, only, of) = match (engine, of) {
+        ("slurm", None) => {
+            let (only, of) = slurm_task(variable)?;
+            (SLURM_TASK, only, of)
+        }
+        ("slurm", Some(of)) => (SLURM_TASK, number(variable, SLURM_TASK)?, of),
+        ("hq", Some(of)) => (HYPERQUEUE_TASK, number(variable, HYPERQUEUE_TASK)?, of),
+        ("hq", None) => return Err("tasks of HyperQueue are not told how many there are: write hq/8".into()),
+        (only, Some(of)) => {
+            let only = only.parse().map_err(|_| HOW)?;
+            return Ok(Part { parts: Parts { of, only: Some(only) }, by: None });
+        }
+        (_, None) => return Err(HOW.into()),
+    };
+    let task = variable(name).unwrap_or_default();
+    Ok(Part { parts: Parts { of, only: Some(only) }, by: Some(format!("{name} {task}")) })
+}
+
+/// Number of the task of a SLURM job array (sbatch(1)).
+const SLURM_TASK: &str = "SLURM_ARRAY_TASK_ID";
+/// Number of the task of a HyperQueue job.
+const HYPERQUEUE_TASK: &str = "HQ_TASK_ID";
+
+/// The number that an engine gives this process by that name.
+fn number(variable: &dyn Fn(&str) -> Option<String>, name: &str) -> Result<u32, String> {
+    let text = variable(name).ok_or_else(|| format!("{name} is not set: this is no task of an array"))?;
+    text.parse().map_err(|_| format!("{name} is {text:?}, not a number"))
 }
 
 /// Which task of how many this process is: arrays may begin at any number and count in any step.
-fn slurm_task(variable: impl Fn(&str) -> Option<String>) -> Result<(u32, u32), String> {
-    let number = |name: &str| -> Result<u32, String> {
-        let text = variable(name).ok_or_else(|| format!("{name} is not set: this is no task of a job array"))?;
-        text.parse().map_err(|_| format!("{name} is {text:?}, not a number"))
-    };
-    let or = |name: &str, default: u32| if variable(name).is_some() { number(name) } else { Ok(default) };
-    let (task, count) = (number("SLURM_ARRAY_TASK_ID")?, number("SLURM_ARRAY_TASK_COUNT")?);
+fn slurm_task(variable: &dyn Fn(&str) -> Option<String>) -> Result<(u32, u32), String> {
+    let or = |name: &str, default: u32| variable(name).map_or(Ok(default), |_| number(variable, name));
+    let (task, count) = (number(variable, SLURM_TASK)?, number(variable, "SLURM_ARRAY_TASK_COUNT")?);
     let (first, step) = (or("SLURM_ARRAY_TASK_MIN", 1)?, or("SLURM_ARRAY_TASK_STEP", 1)?.max(1));
     let place = task.checked_sub(first).filter(|offset| offset.is_multiple_of(step)).map(|offset| offset / step + 1);
-    place.map(|part| (part, count)).ok_or_else(|| format!("task {task} of an array from {first} in steps of {step}"))
+    place.filter(|part| *part <= count).map(|part| (part, count)).ok_or_else(|| {
+        format!(
+            "task {task} of {count} from {first} in steps of {step}: the array has gaps, so say how many parts there are \
+             in all, as slurm/8 (then task 3 is part 3)"
+        )
+    })
 }
 
 pub(super) fn measure() -> impl TypedValueParser<Value = Measure> {
@@ -120,20 +172,47 @@ mod tests {
         assert!(define("res").is_err() && define("=64").is_err());
     }
 
+    /// What `--part TEXT` comes to in that environment: part, of how many, by what.
+    fn told(text: &str, environment: &[(&str, &str)]) -> Result<(u32, u32, Option<String>), String> {
+        let variable = |name: &str| environment.iter().find(|(known, _)| *known == name).map(|(_, v)| (*v).to_owned());
+        part_of(text, &variable).map(|Part { parts, by }| (parts.only.unwrap(), parts.of, by))
+    }
+
     #[test]
     fn tasks_of_arrays_are_parts_wherever_arrays_begin() {
-        let of = |variables: &[(&str, &str)]| {
-            slurm_task(|name| variables.iter().find(|(known, _)| known[12..] == name[12..]).map(|(_, v)| v.to_string()))
+        let of = |ends: &[(&str, &str)]| {
+            let all: Vec<(String, &str)> =
+                ends.iter().map(|(end, value)| (format!("SLURM_ARRAY_TASK_{end}"), *value)).collect();
+            let all: Vec<(&str, &str)> = all.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+            told("slurm", &all)
         };
-        let [id, count, min, step] = ["ID", "COUNT", "MIN", "STEP"].map(|end| format!("SLURM_ARRAY_TASK_{end}"));
-        assert_eq!(of(&[(&id, "3"), (&count, "8")]), Ok((3, 8)));
-        assert_eq!(of(&[(&id, "0"), (&count, "8"), (&min, "0")]), Ok((1, 8)));
-        assert_eq!(of(&[(&id, "14"), (&count, "3"), (&min, "10"), (&step, "2")]), Ok((3, 3)));
-        assert!(of(&[(&id, "3")]).unwrap_err().contains(&count));
-        assert!(of(&[(&id, "x"), (&count, "8")]).unwrap_err().contains("not a number"));
-        assert!(of(&[(&id, "3"), (&count, "8"), (&min, "2"), (&step, "2")]).is_err());
-        assert_eq!(part("3/8"), Ok(Parts { of: 8, only: Some(3) }));
-        assert!(part("3").is_err() && part("a/b").is_err() && part("-1/3").is_err());
+        let by = |task: u32| Some(format!("SLURM_ARRAY_TASK_ID {task}"));
+        assert_eq!(of(&[("ID", "3"), ("COUNT", "8")]), Ok((3, 8, by(3))));
+        assert_eq!(of(&[("ID", "0"), ("COUNT", "8"), ("MIN", "0")]), Ok((1, 8, by(0))));
+        assert_eq!(of(&[("ID", "14"), ("COUNT", "3"), ("MIN", "10"), ("STEP", "2")]), Ok((3, 3, by(14))));
+        assert!(of(&[("ID", "3")]).unwrap_err().contains("SLURM_ARRAY_TASK_COUNT"));
+        assert!(of(&[("ID", "x"), ("COUNT", "8")]).unwrap_err().contains("not a number"));
+        assert!(of(&[("ID", "3"), ("COUNT", "8"), ("MIN", "2"), ("STEP", "2")]).is_err());
+        // tasks 3 and 7 alone: of how many, nothing tells
+        assert!(of(&[("ID", "7"), ("COUNT", "2"), ("MIN", "3")]).unwrap_err().contains("slurm/8"));
+    }
+
+    #[test]
+    fn the_engine_whose_task_it_is_says_the_part() {
+        let (slurm, hq) = ((SLURM_TASK, "7"), (HYPERQUEUE_TASK, "5"));
+        let both = [slurm, hq];
+        assert_eq!(told("slurm/8", &both), Ok((7, 8, Some("SLURM_ARRAY_TASK_ID 7".into()))));
+        assert_eq!(told("hq/8", &both), Ok((5, 8, Some("HQ_TASK_ID 5".into()))));
+        assert_eq!(told("auto/8", &[slurm]), told("slurm/8", &[slurm]));
+        assert_eq!(told("auto/8", &[hq]), told("hq/8", &[hq]));
+        assert!(told("auto/8", &both).unwrap_err().contains("say slurm or hq"));
+        assert!(told("auto/8", &[]).unwrap_err().contains("no task of an array"));
+        assert!(told("hq", &[hq]).unwrap_err().contains("hq/8"));
+        assert!(told("hq/8", &[]).unwrap_err().contains("HQ_TASK_ID is not set"));
+        assert_eq!(told("3/8", &both), Ok((3, 8, None)), "what is written wins");
+        for wrong in ["3", "a/b", "-1/3", "slurm/x", "", "/"] {
+            assert!(told(wrong, &both).is_err(), "{wrong:?}");
+        }
     }
 
     #[test]

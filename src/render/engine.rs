@@ -1,6 +1,7 @@
 //! What the render loop asks of a method.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +10,7 @@ use crate::{
     chain::{Recorder, TechniqueChanges},
     film::{Accumulator, Footprint, Image, Plane, Splats},
     path::{Faults, Mapping, Workspace},
+    ranks::Company,
     rng::Rng,
     scene::description::FilmDescription,
     tempering::{Estimate, RoundReport, Sampler},
@@ -166,6 +168,15 @@ pub trait Engine: Send {
     /// Writes all that it takes to go on from here: see [`restored`](super::run::restored). Reports that nobody has taken
     /// yet are not kept.
     fn save(&self, out: &mut dyn Write) -> io::Result<()>;
+    /// Shares the work with ranks that all have the same method in the same state.
+    ///
+    /// # Panics
+    /// Where the method has no way to; [`shared::faults`](super::shared::faults) says which.
+    fn share(&mut self, _company: &Arc<Company>) {
+        unreachable!("settings are checked before work is shared");
+    }
+    /// Brings what all ranks have to the first one, where the work is shared; all must have done the same sweeps.
+    fn gather(&mut self) {}
     /// The sampler of a path tracer, whose sums may be added to those of others of the same job; nothing for methods whose sums
     /// mean something to themselves only.
     fn points(&self) -> Option<&Sampler<Workspace>> {

@@ -34,6 +34,8 @@ pub struct MergedPart {
     pub path: PathBuf,
     /// Mutations done.
     pub mutations: u64,
+    /// Mutations in all, where there are more to come.
+    pub wanted: Option<u64>,
     /// Wall time spent.
     pub elapsed: Duration,
 }
@@ -71,7 +73,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, CheckpointError> {
         status.elapsed += file.header.done.elapsed;
         let number = file.header.start.settings.parts.only;
         let (path, elapsed) = (file.path.clone(), file.header.done.elapsed);
-        parts.push(MergedPart { number, path, mutations: counts.mutations, elapsed });
+        let wanted = engine.mutations_wanted().filter(|wanted| *wanted > counts.mutations);
+        parts.push(MergedPart { number, path, mutations: counts.mutations, wanted, elapsed });
         match number {
             Some(number) => pool.add(number, engine.as_ref()),
             None => whole = Some(engine.develop()),

@@ -1,5 +1,6 @@
 //! From a job to files: settings, budgets, progress, log, output.
 
+pub mod allocation;
 mod baseline;
 pub mod calibration;
 pub mod checkpoint;
@@ -16,6 +17,7 @@ pub mod replay;
 mod replica_exchange;
 mod run;
 pub mod settings;
+pub mod shared;
 pub mod status;
 #[cfg(test)]
 mod tests;
@@ -25,7 +27,7 @@ pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
 pub use health::{Health, Verdict};
 pub use merge::{Merged, MergedPart, merge};
 pub use output::{Output, Picture};
-pub use run::{FLUSHED, Job, Outcome, RenderError, engine, restored, run, run_from};
+pub use run::{FLUSHED, Job, Outcome, RenderError, engine, restored, run, run_from, run_on};
 pub use settings::{
     Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Parts, Settings,
 };

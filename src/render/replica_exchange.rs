@@ -1,6 +1,7 @@
 //! `re` and `path`: replica exchange on the light paths of a scene, and its uniform rung alone.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use super::{
     engine::{Counts, Development, Diagnostics, Engine, Phase, Sheet, Stage, film_warnings},
@@ -8,6 +9,7 @@ use super::{
 };
 use crate::{
     path::Workspace,
+    ranks::Company,
     rng::Rng,
     saved::{Source, Unfit},
     tempering::{Choices, LadderChoice, Learning, RoundReport, Sampler, Setup},
@@ -106,6 +108,14 @@ impl Engine for ReplicaExchange {
 
     fn points(&self) -> Option<&Sampler<Workspace>> {
         self.sampler.is_uniform_alone().then_some(&self.sampler)
+    }
+
+    fn share(&mut self, company: &Arc<Company>) {
+        self.sampler.share(company.clone());
+    }
+
+    fn gather(&mut self) {
+        self.sampler.gather();
     }
 
     fn set_wanted(&mut self, mutations: Option<u64>) {

@@ -10,6 +10,7 @@ use std::{
 };
 
 use super::{
+    allocation,
     baseline::Mlt,
     calibration,
     checkpoint::{Checkpoint, CheckpointError, Header, Resumed},
@@ -20,6 +21,7 @@ use super::{
     parts::{Agreement, Several},
     replica_exchange::ReplicaExchange,
     settings::{Method, PacketChoice, Settings},
+    shared::{Led, follow},
     status::{Observer, Packets, RunStart, SetUp, Status, Stop},
     trial,
 };
@@ -27,6 +29,7 @@ use crate::{
     film::Footprint,
     math::denormals,
     path::{Fault, Mapping, MappingKind, Widths, first_fault},
+    ranks::Company,
     rng::Rng,
     saved::{Source, Unfit},
     scene::Scene,
@@ -69,6 +72,12 @@ pub enum RenderError {
     /// A checkpoint cannot be gone on with.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// Ranks do not work on the same run.
+    #[error("rank {rank} has another version of relt, other settings or another scene than rank 0: give all the same")]
+    Ranks {
+        /// The first that differs.
+        rank: usize,
+    },
     /// The operating system gave no threads.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {
@@ -95,14 +104,27 @@ pub fn run(job: &Job, observer: &dyn Observer) -> Result<Outcome, RenderError> {
 pub fn run_from(
     job: &Job,
     scene_digest: &str,
-    mut resumed: Option<Resumed>,
+    resumed: Option<Resumed>,
     observer: &dyn Observer,
 ) -> Result<Outcome, RenderError> {
+    let outcome = run_on(None, job, scene_digest, resumed, observer)?;
+    Ok(outcome.expect("the first rank, as there is no other"))
+}
+
+/// As [`run_from`], together with other ranks that call this with the same job and the same checkpoint: the first of them
+/// alone tells its `observer` and comes to something.
+pub fn run_on(
+    company: Option<&Arc<Company>>,
+    job: &Job,
+    scene_digest: &str,
+    mut resumed: Option<Resumed>,
+    observer: &dyn Observer,
+) -> Result<Option<Outcome>, RenderError> {
     let settings = &job.settings;
     let before = resumed.as_ref().map(|resumed| resumed.header.clone());
     let clock = before.as_ref().map_or_else(Clock::start, |b| Clock::going_on(b.done.elapsed, b.done.cpu));
     let began = clock.elapsed();
-    let threads = settings.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+    let threads = settings.threads.unwrap_or_else(allocation::threads);
     let pool = thread_pool(threads, settings.pin)?;
     let (mapping, mapping_trial) = match &before {
         Some(before) => (before.start.mapping, before.start.mapping_trial.clone()),
@@ -120,7 +142,11 @@ pub fn run_from(
     };
     let resumed_at = before.as_ref().map(|before| before.done.mutations);
     let start = RunStart { mapping, mapping_trial, resumed_at, ..run_start(job, threads, widths) };
-    observer.started(&start);
+    company.map_or(Ok(()), |company| agree(company, &start, scene_digest))?;
+    let leads = company.is_none_or(|company| company.is_first());
+    if leads {
+        observer.started(&start);
+    }
     let frame = Frame {
         start: &start,
         scene_digest,
@@ -133,7 +159,7 @@ pub fn run_from(
         (watch.set_up, watch.last_round) = (done.set_up, last_round.map(Arc::new));
     }
     watch.set_up.calibration += watch.clock.elapsed() - began;
-    let (mut engine, interrupted) = pool.install(|| -> Result<_, CheckpointError> {
+    let done = pool.install(|| -> Result<_, CheckpointError> {
         let began = watch.clock.elapsed();
         let [planned, wanted] =
             [frame.planned, settings.mutations_per_pixel].map(|mpp| settings.parts.mutations(mpp, stage.pixels()));
@@ -142,18 +168,41 @@ pub fn run_from(
             None => engine(&stage, settings, planned),
         };
         engine.set_wanted(wanted);
+        if let Some(company) = company {
+            // a checkpoint that all go on from is not replaced before all have read it
+            company.everywhere(&());
+            if !leads {
+                follow(engine, &stage, company);
+                return Ok(None);
+            }
+            engine = Box::new(Led::new(engine, company.clone()));
+        }
         if resumed_at.is_none() {
             watch.set_up.bootstrap = watch.clock.elapsed() - began;
         }
         let interrupted = work(job, &stage, engine.as_mut(), &frame, observer, &mut watch);
+        engine.gather();
         observer.ended(&frame.checkpoint(&status(job, engine.as_ref(), &watch), engine.as_ref()));
-        Ok((engine, interrupted))
+        Ok(Some((engine, interrupted)))
     })?;
+    let Some((mut engine, interrupted)) = done else { return Ok(None) };
     let mut outcome = conclude(job, &stage, engine.as_mut(), &start, &watch, interrupted);
     if !pool.broadcast(|_| denormals::are_kept()).into_iter().all(|kept| kept) {
         outcome.warnings.push(FLUSHED.into());
     }
-    Ok(outcome)
+    Ok(Some(outcome))
+}
+
+/// Nothing where all ranks are about the same run, by the same program and with the same kind of arithmetic.
+fn agree(company: &Company, start: &RunStart, scene_digest: &str) -> Result<(), RenderError> {
+    let settings = Settings { threads: None, pin: false, packet: PacketChoice::Auto, ..start.settings.clone() };
+    let own =
+        (env!("CARGO_PKG_VERSION").to_owned(), start.mapping.name().to_owned(), settings, scene_digest.to_owned());
+    let all = company.everywhere(&own);
+    match all.iter().position(|other| *other != all[0]) {
+        Some(rank) => Err(RenderError::Ranks { rank }),
+        None => Ok(()),
+    }
 }
 
 /// What is said where denormal numbers are not kept.
@@ -293,6 +342,7 @@ fn work(
         observer.progress(&status);
         rounds.iter().for_each(|round| observer.round(round));
         if observer.wants_picture(&status) {
+            engine.gather();
             let look = || {
                 let development = engine.develop();
                 let normalisation = development.normalisation.map(|e| (e.value, e.standard_error));
@@ -304,6 +354,7 @@ fn work(
             if observer.stops_the_clock() { watch.clock.pause(look) } else { look() }
         }
         if observer.wants_checkpoint(&status) {
+            engine.gather();
             observer.checkpoint(&frame.checkpoint(&status, engine));
         }
     }

@@ -211,7 +211,8 @@ pub struct Settings {
     /// Into how many independent parts the job is cut, and which of them is run.
     #[serde(default)]
     pub parts: Parts,
-    /// Worker threads; as many as the machine runs at once where absent.
+    /// Worker threads; as many as there are for this process ([`allocation::threads`](super::allocation::threads)) where
+    /// absent.
     pub threads: Option<usize>,
     /// Keep every worker on a core of its own.
     pub pin: bool,

@@ -74,6 +74,15 @@ pub struct SavedBlock {
     sweeps: u64,
 }
 
+/// What a [`Block`] saw, without where its chains are: what a rank needs of the blocks of others to learn from them.
+#[derive(Serialize, Deserialize)]
+pub struct BlockStatistics {
+    tallies: Vec<SavedTally>,
+    trips: Trips,
+    index: Option<IndexProcess>,
+    sweeps: u64,
+}
+
 /// A [`Part`] as it is saved: what it works with between two sweeps follows from the job.
 #[derive(Serialize, Deserialize)]
 struct SavedPart {
@@ -171,6 +180,28 @@ impl<W: Default + Send> Block<W> {
         }
         expect(replica_on.iter().all(|replica| *replica != u16::MAX), "rungs")?;
         (self.rung, self.replica_on, self.trips, self.index, self.sweeps) = (rung, replica_on, trips, index, sweeps);
+        Ok(())
+    }
+
+    /// What was seen, without where chains are.
+    pub fn statistics(&self) -> BlockStatistics {
+        BlockStatistics {
+            tallies: self.parts.iter().map(|part| part.tally.saved()).collect(),
+            trips: self.trips.clone(),
+            index: self.index.clone(),
+            sweeps: self.sweeps,
+        }
+    }
+
+    /// Takes what a block with the same ladders and offers saw; chains stay as they are here.
+    pub fn set_statistics(&mut self, told: BlockStatistics) -> Result<(), Unfit> {
+        let BlockStatistics { tallies, trips, index, sweeps } = told;
+        expect(tallies.len() == self.parts.len() && index.is_some() == self.index.is_some(), "ladders")?;
+        expect(trips.fits(self.rung.len(), self.chains), "replicas")?;
+        for (part, tally) in self.parts.iter_mut().zip(tallies) {
+            part.tally.restore(tally)?;
+        }
+        (self.trips, self.index, self.sweeps) = (trips, index, sweeps);
         Ok(())
     }
 

@@ -99,6 +99,11 @@ impl Probes {
         films.try_for_each(|film| film.restore(from))
     }
 
+    /// Adds the sums of other probes of the same pixels.
+    pub fn merge(&self, other: &Probes) {
+        self.films().zip(other.films()).for_each(|(film, other)| film.merge(other));
+    }
+
     /// Splats for [`deposit`](Self::deposit).
     pub fn splats() -> Splats {
         Splats::new(2 * RATIOS.len())

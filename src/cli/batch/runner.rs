@@ -217,7 +217,7 @@ impl<'a> Runner<'a> {
             fs::create_dir_all(folder)
                 .map_err(|error| Failure::running(format_args!("cannot make {}: {error}", folder.display())))?;
         }
-        let planned = job.arguments(goes_on)?.plan()?;
+        let planned = job.arguments(goes_on)?.plan(None)?;
         let strict = planned.arguments.strict;
         let begin = Instant::now();
         let loaded = self.scenes.of(job, &planned.arguments.scene)?;
@@ -233,6 +233,7 @@ impl<'a> Runner<'a> {
         let voice = Voice { runner: self, index, turn, begin: Instant::now(), ended: Mutex::new(None) };
         let asked = job.keep.as_ref().map(|_| asked.clone());
         let rendered = planned.render(&loaded.opened, &loaded.digest, asked, self.stop, &voice)?;
+        let rendered = rendered.expect("jobs of a batch have no company");
         if rendered.outcome.interrupted {
             return Ok(End::Interrupted);
         }

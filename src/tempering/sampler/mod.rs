@@ -12,6 +12,7 @@ mod pooling;
 mod reporting;
 mod rounds;
 mod saved;
+mod sharing;
 
 use std::sync::Arc;
 
@@ -22,6 +23,7 @@ pub use learnt::Learnt;
 use learnt::Luminance;
 
 use serde::{Deserialize, Serialize};
+use sharing::Share;
 
 use super::{
     Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round,
@@ -66,6 +68,8 @@ pub struct Sampler<W> {
     /// Evaluations to go through.
     wanted: Option<u64>,
     reports: Vec<RoundReport>,
+    /// The other ranks, where the work is shared.
+    share: Option<Share>,
 }
 
 /// All that changes between sweeps, but for portions, film and importance: what there is to save of it.
@@ -272,6 +276,7 @@ impl<W: Default + Send> Sampler<W> {
             planned: evaluations,
             wanted: evaluations,
             reports: Vec::new(),
+            share: None,
         }
     }
 
@@ -341,6 +346,7 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Sweeps within a round.
     fn work<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64) {
+        let own = self.own();
         let (round, schedule, screen) = (&self.state.round, self.state.schedule, &self.screen);
         let keeps = schedule.round == 0 && !schedule.frozen;
         let purpose = match round.open {
@@ -349,7 +355,7 @@ impl<W: Default + Send> Sampler<W> {
             false => Use::Image,
         };
         let half = usize::from(schedule.done >= schedule.middle());
-        self.portions.par_iter_mut().for_each(|portion| {
+        self.portions[own.clone()].par_iter_mut().for_each(|portion| {
             let canvas = screen.canvas();
             let Portion { uniform, tally, ladders, starts, .. } = portion;
             for _ in 0..sweeps {
@@ -370,8 +376,9 @@ impl<W: Default + Send> Sampler<W> {
             }
         });
         let drawn = sweeps * (self.portions.len() * self.state.schedule.points) as u64;
+        let drawn_here = sweeps * (own.len() * self.state.schedule.points) as u64;
         let mut uniform_rays = 0;
-        for portion in &mut self.portions {
+        for portion in &mut self.portions[own] {
             let (uniform, faults) = portion.uniform.take_rays_and_faults();
             uniform_rays += uniform;
             let (ladders, more) = portion.ladders.as_mut().map(Block::take_rays_and_faults).unwrap_or_default();
@@ -381,7 +388,7 @@ impl<W: Default + Send> Sampler<W> {
         }
         if keeps {
             let first = &mut self.state.first_rays[usize::from(purpose == Use::OpenImage)];
-            *first = [first[0] + drawn, first[1] + uniform_rays];
+            *first = [first[0] + drawn_here, first[1] + uniform_rays];
         }
         if purpose != Use::Starts {
             self.state.points[0] += drawn;

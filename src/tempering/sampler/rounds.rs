@@ -72,6 +72,13 @@ impl<W: Default + Send> Sampler<W> {
     /// Ends the round at work and begins the next.
     pub(super) fn end_round<T: Target<Workspace = W>>(&mut self, target: &T) {
         self.flush();
+        self.exchange();
+        self.conclude_round(target);
+        self.keep_own();
+    }
+
+    /// What follows from the round at work, with all that was seen in it at hand.
+    fn conclude_round<T: Target<Workspace = W>>(&mut self, target: &T) {
         let learnt = self.learn();
         self.state.image_correlation = self.measured(&learnt).and_then(|measured| measured.correlation());
         let mut report = self.report(&learnt);
@@ -98,16 +105,7 @@ impl<W: Default + Send> Sampler<W> {
 
     /// Fixes where chains are wanted. What was seen of g until now goes to the image only.
     fn weigh(&mut self) {
-        let layer = self.screen.layers.even.expect("a layer of stratified points");
-        let mut sums = self.screen.film.layer(layer.own);
-        if let Some(elsewhere) = layer.elsewhere {
-            let more = self.screen.film.layer(elsewhere);
-            sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
-        }
-        // sums may be beyond f32 where their terms are not
-        let luminance = |[r, g, b, points]: [f64; 4]| [luminance_of_sums([r, g, b]), points];
-        let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
-        let importance = Arc::new(Importance::new(self.screen.size, &found));
+        let importance = Arc::new(self.found_by_first(Self::importance_found));
         for portion in &mut self.portions {
             portion.uniform.set_importance(&importance);
             portion.starts.clear();
@@ -119,10 +117,25 @@ impl<W: Default + Send> Sampler<W> {
             self.state.schedule.done + at_most(super::BOOTSTRAP, self.planned, 1.0 / 32.0).div_ceil(a_sweep);
     }
 
+    /// Where chains are wanted, by what stratified points have shown on the film.
+    fn importance_found(&self) -> Importance {
+        let layer = self.screen.layers.even.expect("a layer of stratified points");
+        let mut sums = self.screen.film.layer(layer.own);
+        if let Some(elsewhere) = layer.elsewhere {
+            let more = self.screen.film.layer(elsewhere);
+            sums.iter_mut().flatten().zip(more.as_flattened()).for_each(|(sum, more)| *sum += more);
+        }
+        // sums may be beyond f32 where their terms are not
+        let luminance = |[r, g, b, points]: [f64; 4]| [luminance_of_sums([r, g, b]), points];
+        let found: Vec<[f64; 2]> = sums.into_iter().map(luminance).collect();
+        Importance::new(self.screen.size, &found)
+    }
+
     /// Records what states have gathered; the round's settings still hold.
     fn flush(&mut self) {
+        let own = self.own();
         let (screen, round) = (&self.screen, &self.state.round);
-        self.portions.par_iter_mut().for_each(|portion| {
+        self.portions[own].par_iter_mut().for_each(|portion| {
             if let Some(block) = &mut portion.ladders {
                 block.flush(&screen.canvas(), round);
                 block.deposit(&screen.canvas());
@@ -201,12 +214,16 @@ impl<W: Default + Send> Sampler<W> {
             .collect();
         let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.state.offers, self.screen.size);
         let importance = self.importance.as_ref();
+        let own = self.own();
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
             let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
             let mut block = Block::new(rng, (i, ladders), chains + 1, offers, LANES_A_PART, layers, size);
             block.set_importance(importance);
-            block.start(target, &starts);
+            // what others work on they start themselves
+            if own.contains(&i) {
+                block.start(target, &starts);
+            }
             portion.ladders = Some(block);
         });
         self.state.ladders_a_block = ladders;

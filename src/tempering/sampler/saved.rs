@@ -30,7 +30,7 @@ struct SavedSampler {
 
 /// A [`Portion`] as it is saved.
 #[derive(Serialize, Deserialize)]
-struct SavedPortion {
+pub(super) struct SavedPortion {
     uniform: (u64, usize),
     tally: SavedTally,
     ladders: Option<SavedBlock>,
@@ -53,15 +53,7 @@ impl<W: Default + Send> Sampler<W> {
         };
         write_value(out, &saved)?;
         for portion in &self.portions {
-            let saved = SavedPortion {
-                uniform: portion.uniform.saved(),
-                tally: portion.tally.saved(),
-                ladders: portion.ladders.as_ref().map(Block::saved),
-                past: portion.past.clone(),
-                added: portion.added,
-                starts: portion.starts.clone(),
-            };
-            write_value(out, &saved)?;
+            write_value(out, &portion.saved())?;
         }
         self.screen.film.save(out)?;
         self.screen.probes.as_ref().map_or(Ok(()), |probes| probes.save(out))
@@ -98,7 +90,8 @@ impl<W: Default + Send> Sampler<W> {
         Ok(sampler)
     }
 
-    fn restore_portion(&mut self, number: usize, saved: SavedPortion) -> Result<(), Unfit> {
+    /// Puts a portion where it was saved.
+    pub(super) fn restore_portion(&mut self, number: usize, saved: SavedPortion) -> Result<(), Unfit> {
         let (rng, size, layers) = (self.rng, self.screen.size, self.screen.prepared.count);
         let rungs = self.state.round.ladder.rungs();
         let Portion { uniform, tally, ladders, past, added, starts } = &mut self.portions[number];
@@ -127,5 +120,19 @@ impl<W: Default + Send> Sampler<W> {
         expect(saved.starts.iter().all(on_film), "starts")?;
         (*past, *added, *starts) = (saved.past, saved.added, saved.starts);
         Ok(())
+    }
+}
+
+impl<W: Default + Send> Portion<W> {
+    /// All that there is to save of it between sweeps.
+    pub(super) fn saved(&self) -> SavedPortion {
+        SavedPortion {
+            uniform: self.uniform.saved(),
+            tally: self.tally.saved(),
+            ladders: self.ladders.as_ref().map(Block::saved),
+            past: self.past.clone(),
+            added: self.added,
+            starts: self.starts.clone(),
+        }
     }
 }
