@@ -100,8 +100,11 @@ def main():
         probe = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n"]
         if shutil.which("mpirun"):
             ranks = lambda n, k: run(with_mpi, folder, "--threads", "1", "--mpp", "200", "--replicas", str(k), before=[*probe, str(n)])
-            first = ranks(2, 4)
-            if first["exchanges"]:
+            probing = [*probe, "2", with_mpi, "render", SCENE, *BASE, "--mpp", "1", "--threads", "1", "-o", "probe.exr"]
+            # without the feature, mpirun starts the same run several times
+            said = subprocess.run(probing, cwd=folder, capture_output=True, text=True).stderr
+            if "on 2 ranks" in said:
+                first = ranks(2, 4)
                 second = ranks(2, 16)
                 # what rank 0 hears of the others: blocks elsewhere tell t₀ + t₁ K a round, and film and probes once each
                 print("Bytes that rank 0 hears: (1 − 1/n) · rounds · (t₀ + t₁ K) + ⌈log₂ n⌉ · film\n")
