@@ -79,6 +79,26 @@ def talk_of_ranks(relt, folder):
     return t0, t1, first["rounds"]
 
 
+def predict(start, each, told, latency, bandwidth):
+    """Prints what a large run is to take: `start` and `each` in seconds a run and a mutation, `told` of `talk_of_ranks`."""
+    print("Predicted for a network of %g µs and %g GB/s, a picture of 10¹⁰ mutations with K = 4:\n" % (1e6 * latency, bandwidth / 1e9))
+    print("| cores | as | compute (s) | start (s) | talk (s) | efficiency |\n|---|---|---|---|---|---|")
+    work = 1e10 * each
+    for cores in (1, 16, 64, 1000):
+        for parts in sorted({1, math.ceil(cores / BLOCKS), cores}):
+            ranks = math.ceil(cores / parts)
+            if ranks > BLOCKS or (ranks > 1 and told is None):
+                continue
+            blocks = math.ceil(BLOCKS / ranks) / BLOCKS * ranks  # the rank with the most blocks is waited for
+            compute = work / cores * blocks
+            talk = 0.0
+            if ranks > 1:
+                rounds = told[2] + math.log2(max(compute * cores / parts / (start + 1), 1))
+                talk = rounds * (math.ceil(math.log2(ranks)) * latency + 1e6 * (told[0] + 4 * told[1]) / bandwidth)
+                talk += compute / 0.2 * 2 * math.ceil(math.log2(ranks)) * latency  # an order a slice
+            print(f"| {cores} | {parts} parts × {ranks} ranks | {compute:.1f} | {start:.2f} | {talk:.3f} | {work / cores / (compute + start + talk):.2f} |")
+
+
 def main():
     words = sys.argv[1:]
     latency, bandwidth = 2e-6, 10e9
@@ -123,22 +143,7 @@ def main():
 
         told = talk_of_ranks(with_mpi, folder)
 
-        print("Predicted for a network of %g µs and %g GB/s, a picture of 10¹⁰ mutations with K = 4:\n" % (1e6 * latency, bandwidth / 1e9))
-        print("| cores | as | compute (s) | start (s) | talk (s) | efficiency |\n|---|---|---|---|---|---|")
-        work = 1e10 * (base + slope * 2 / 4)
-        for cores in (1, 16, 64, 1000):
-            for parts in sorted({1, math.ceil(cores / BLOCKS), cores}):
-                ranks = math.ceil(cores / parts)
-                if ranks > BLOCKS or (ranks > 1 and told is None):
-                    continue
-                blocks = math.ceil(BLOCKS / ranks) / BLOCKS * ranks  # the rank with the most blocks is waited for
-                compute = work / cores * blocks
-                talk = 0.0
-                if ranks > 1:
-                    rounds = told[2] + math.log2(max(compute * cores / parts / (start + 1), 1))
-                    talk = rounds * (math.ceil(math.log2(ranks)) * latency + 1e6 * (told[0] + 4 * told[1]) / bandwidth)
-                    talk += compute / 0.2 * 2 * math.ceil(math.log2(ranks)) * latency  # an order a slice
-                print(f"| {cores} | {parts} parts × {ranks} ranks | {compute:.1f} | {start:.2f} | {talk:.3f} | {work / cores / (compute + start + talk):.2f} |")
+        predict(start, base + slope * 2 / 4, told, latency, bandwidth)
 
 
 if __name__ == "__main__":
