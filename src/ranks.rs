@@ -33,6 +33,12 @@ pub trait Ranks: Send + Sync {
     fn abort(&self, code: i32) -> !;
 }
 
+/// How many processes `mpirun` or `srun` has started for one run with this one, if this program has no way to talk to them.
+pub fn out_of_reach() -> Option<u32> {
+    let count = |name: &&str| std::env::var(name).ok()?.parse().ok();
+    ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].iter().find_map(count).filter(|count| *count > 1 && !cfg!(feature = "mpi"))
+}
+
 /// Ranks, and what it takes to talk to them.
 pub struct Company {
     ranks: Box<dyn Ranks>,

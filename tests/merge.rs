@@ -202,6 +202,10 @@ fn senseless_parts_are_refused() {
         let text = ended(&mut command, 2);
         assert!(text.contains(part), "{options:?}: {part:?} is not in {text}");
     }
+    // ranks that know nothing of one another would write the same file
+    let mut command = render(folder.path(), "cornell-box", &["-o", "whole.exr"]);
+    let text = if cfg!(feature = "mpi") { String::new() } else { ended(command.env("OMPI_COMM_WORLD_SIZE", "4"), 2) };
+    assert!(cfg!(feature = "mpi") || text.contains("one of 4 processes of MPI"), "{text}");
     // as a task of an array from 0 to 3
     let array = [("ID", "2"), ("COUNT", "4"), ("MIN", "0")];
     let options = ["--part", "slurm", "--mpp", "8", "--mapping", "unidirectional", "-o", "whole.exr"];

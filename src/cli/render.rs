@@ -12,7 +12,7 @@ use super::run_options::RunOptions;
 use super::scene::{Opened, SceneArguments, number_of_threads};
 use super::{signals, values};
 use crate::film::file::{Claim, check_writable, claim, write_somewhere};
-use crate::ranks::{Company, Talk};
+use crate::ranks::{self, Company, Talk};
 use crate::render::log::{self, Log};
 use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Teller, Verbosity};
@@ -100,6 +100,12 @@ const WORTH_TELLING: u64 = 1 << 30;
 
 /// Runs the subcommand.
 pub(super) fn run(arguments: Render) -> Result<(), Failure> {
+    if let Some(count) = ranks::out_of_reach().filter(|_| arguments.part.is_none()) {
+        return Err(Failure::input(format_args!(
+            "this is one of {count} processes of MPI, and relt is built without the feature mpi: all would make the same \
+             image; build it with cargo build --release --features mpi, or give each a --part"
+        )));
+    }
     let company = Company::of_processes();
     let done = on_ranks(arguments, company.clone());
     if let (Err(failure), Some(company)) = (&done, &company) {

@@ -63,7 +63,7 @@ const FLOOR: f64 = 0.5;
 /// The mapping with all techniques that serves runs of those settings.
 ///
 /// Chains want points that are cheap: one technique each, and all at once only where points are uniform. So `re` gets
-/// `multiplexed` where its stratified points are [open](Choices::opens), and are then those of `bidirectional`. `mlt` has no
+/// `multiplexed` where its stratified points are [open](crate::tempering::Choices::opens), and are then those of `bidirectional`. `mlt` has no
 /// such points and gets it only where there are mirrors or clear glass (without, it has twelve times the squared error of
 /// `light` on `lattice`; relt study scenes/studies/mappings.toml).
 fn of_all_techniques(scene: &Scene, settings: &Settings, pixels: u64) -> MappingKind {

@@ -31,6 +31,8 @@ holds() {
 clean() {
     local pid
     for pid in "${started[@]}"; do kill "$pid" 2>/dev/null; done
+    sleep 2
+    for pid in "${started[@]}"; do kill -9 "$pid" 2>/dev/null; done
     umount "$scratch/small" 2>/dev/null
     say "logs in $scratch"
 }
@@ -89,7 +91,7 @@ P
     cluster
     submit
     holds "server and workers started again, same job: goes on, same bits" eval 'same image.exr && went_on image.[1-3].log'
-    kill "$server"
+    kill -9 "$server"
     cd "$scratch"
 }
 

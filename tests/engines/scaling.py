@@ -54,6 +54,51 @@ def compared(rows):
     print()
 
 
+def talk_of_ranks(relt, folder):
+    """Fits and checks what ranks tell one another: t₀, t₁ and the number of rounds; nothing where there is no MPI."""
+    probe = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n"]
+    # without the feature, mpirun starts the same run several times
+    probing = [*probe, "2", relt, "render", SCENE, *BASE, "--mpp", "1", "--threads", "1", "-o", "probe.exr"]
+    if not shutil.which("mpirun") or "on 2 ranks" not in subprocess.run(probing, cwd=folder, capture_output=True, text=True).stderr:
+        return None
+
+    def ranks(n, k):
+        return run(relt, folder, "--threads", "1", "--mpp", "60", "--replicas", str(k), before=[*probe, str(n)])
+
+    # of all blocks, those elsewhere tell t₀ + t₁ K a round; film and probes are in t₀
+    print("Bytes that rank 0 hears: (1 − 1/n) · rounds · (t₀ + t₁ K)\n")
+    first, second = ranks(2, 4), ranks(2, 16)
+    share = lambda end, n: end["megabytes"] / (end["rounds"] + 1) / (1 - 1 / n)
+    t0, t1 = line([4, 16], [share(first, 2), share(second, 2)])
+    rows = []
+    for n, k in ((3, 4), (4, 4), (2, 8), (2, 32), (5, 16)):
+        end = ranks(n, k)
+        rows.append((f"{n} ranks, K = {k} (MB)", end["megabytes"], (1 - 1 / n) * (end["rounds"] + 1) * (t0 + t1 * k)))
+    compared(rows)
+    print(f"t₀ + t₁ K = {t0:.2f} + {t1:.3f} K MB a round, {first['exchanges']} exchanges in all\n")
+    return t0, t1, first["rounds"]
+
+
+def predict(start, each, told, latency, bandwidth):
+    """Prints what a large run is to take: `start` and `each` in seconds a run and a mutation, `told` of `talk_of_ranks`."""
+    print("Predicted for a network of %g µs and %g GB/s, a picture of 10¹⁰ mutations with K = 4:\n" % (1e6 * latency, bandwidth / 1e9))
+    print("| cores | as | compute (s) | start (s) | talk (s) | efficiency |\n|---|---|---|---|---|---|")
+    work = 1e10 * each
+    for cores in (1, 16, 64, 1000):
+        for parts in sorted({1, math.ceil(cores / BLOCKS), cores}):
+            ranks = math.ceil(cores / parts)
+            if ranks > BLOCKS or (ranks > 1 and told is None):
+                continue
+            blocks = math.ceil(BLOCKS / ranks) / BLOCKS * ranks  # the rank with the most blocks is waited for
+            compute = work / cores * blocks
+            talk = 0.0
+            if ranks > 1:
+                rounds = told[2] + math.log2(max(compute * cores / parts / (start + 1), 1))
+                talk = rounds * (math.ceil(math.log2(ranks)) * latency + 1e6 * (told[0] + 4 * told[1]) / bandwidth)
+                talk += compute / 0.2 * 2 * math.ceil(math.log2(ranks)) * latency  # an order a slice
+            print(f"| {cores} | {parts} parts × {ranks} ranks | {compute:.1f} | {start:.2f} | {talk:.3f} | {work / cores / (compute + start + talk):.2f} |")
+
+
 def main():
     words = sys.argv[1:]
     latency, bandwidth = 2e-6, 10e9
@@ -96,41 +141,9 @@ def main():
             rows.append((f"{parts} parts, 300 mpp (s of all)", cpu, parts * start + (model(4, mutations) - start)))
         compared(rows)
 
-        told = None
-        probe = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n"]
-        if shutil.which("mpirun"):
-            ranks = lambda n, k: run(with_mpi, folder, "--threads", "1", "--mpp", "200", "--replicas", str(k), before=[*probe, str(n)])
-            first = ranks(2, 4)
-            if first["exchanges"]:
-                second = ranks(2, 16)
-                # what rank 0 hears of the others: blocks elsewhere tell t₀ + t₁ K a round, and film and probes once each
-                print("Bytes that rank 0 hears: (1 − 1/n) · rounds · (t₀ + t₁ K) + ⌈log₂ n⌉ · film\n")
-                share = lambda end, n: end["megabytes"] / (end["rounds"] + 1) / (1 - 1 / n)
-                t0, t1 = line([4, 16], [share(first, 2), share(second, 2)])
-                told = (t0, t1, first["rounds"])
-                rows = []
-                for n, k in ((3, 4), (4, 4), (2, 8), (2, 32), (5, 16)):
-                    end = ranks(n, k)
-                    rows.append((f"{n} ranks, K = {k} (MB)", end["megabytes"], (1 - 1 / n) * (end["rounds"] + 1) * (t0 + t1 * k)))
-                compared(rows)
-                print(f"t₀ + t₁ K = {t0:.2f} + {t1:.3f} K MB a round, {first['exchanges']} exchanges in all\n")
+        told = talk_of_ranks(with_mpi, folder)
 
-        print("Predicted for a network of %g µs and %g GB/s, a picture of 10¹⁰ mutations with K = 4:\n" % (1e6 * latency, bandwidth / 1e9))
-        print("| cores | as | compute (s) | start (s) | talk (s) | efficiency |\n|---|---|---|---|---|---|")
-        work = 1e10 * (base + slope * 2 / 4)
-        for cores in (1, 16, 64, 1000):
-            for parts in sorted({1, math.ceil(cores / BLOCKS), cores}):
-                ranks = math.ceil(cores / parts)
-                if ranks > BLOCKS or (ranks > 1 and told is None):
-                    continue
-                blocks = math.ceil(BLOCKS / ranks) / BLOCKS * ranks  # the rank with the most blocks is waited for
-                compute = work / cores * blocks
-                talk = 0.0
-                if ranks > 1:
-                    rounds = told[2] + math.log2(max(compute * cores / parts / (start + 1), 1))
-                    talk = rounds * (math.ceil(math.log2(ranks)) * latency + 1e6 * (told[0] + 4 * told[1]) / bandwidth)
-                    talk += compute / 0.2 * 2 * math.ceil(math.log2(ranks)) * latency  # an order a slice
-                print(f"| {cores} | {parts} parts × {ranks} ranks | {compute:.1f} | {start:.2f} | {talk:.3f} | {work / cores / (compute + start + talk):.2f} |")
+        predict(start, base + slope * 2 / 4, told, latency, bandwidth)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ use std::{ops::Range, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Portion, Sampler, saved::SavedPortion};
+use super::{Portion, Sampler, Screen, saved::SavedPortion};
 use crate::{
     film::Accumulator,
     path::Faults,
@@ -50,6 +50,10 @@ impl<W: Default + Send> Sampler<W> {
     pub fn share(&mut self, company: Arc<Company>) {
         let of = |rank: usize| self.portions.len() * rank / company.count();
         let own = of(company.number())..of(company.number() + 1);
+        if !company.is_first() {
+            let Screen { size, prepared, unit, .. } = &self.screen;
+            self.screen.film = Accumulator::new(size[0], size[1], prepared.count, *unit);
+        }
         self.share = Some(Share { company, own });
         self.keep_own();
     }
@@ -118,13 +122,13 @@ impl<W: Default + Send> Sampler<W> {
         }
     }
 
-    /// Of what is summed over all blocks the first rank keeps the sum; the others begin anew.
+    /// Of what is summed over all blocks, but for the film, the first rank keeps the sum; the others begin anew. Their film they
+    /// keep until it is gathered.
     pub(super) fn keep_own(&mut self) {
         if self.share.as_ref().is_none_or(|share| share.company.is_first()) {
             return;
         }
         let screen = &mut self.screen;
-        screen.film = Accumulator::new(screen.size[0], screen.size[1], screen.prepared.count, screen.unit);
         screen.groups = PointGroups::new(self.portions.len());
         if screen.probes.is_some() {
             screen.probes = Some(Probes::new(&screen.map, screen.unit));
