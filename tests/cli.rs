@@ -214,7 +214,10 @@ fn a_confined_scene_reads_nothing_from_elsewhere() {
         assert_eq!(code, Some(0), "without --confine:\n{text}");
     }
     // no key of a study: it would have no effect there
-    write("study.toml", &format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'scene/scene.xml'\n{method}confine = true\n"));
+    write(
+        "study.toml",
+        &format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'scene/scene.xml'\n{method}confine = true\n"),
+    );
     let (code, text) = run(&["study", "study.toml", "--dry-run"]);
     assert!(code == Some(2) && text.contains("`confine` is no option of a method"), "{text}");
 }

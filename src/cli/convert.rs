@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::values;
-use crate::load::Reach;
 use crate::convert::{ConvertError, Job, Kind, Note, convert};
+use crate::load::Reach;
 
 /// Converts a scene of Mitsuba 0.5, 0.6 or 2 (.xml) or of pbrt-v4 (.pbrt) to Mitsuba 3's XML
 ///

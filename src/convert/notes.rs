@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use crate::load::access::Access;
-use crate::load::{self, LoadError, Reach};
 use crate::load::faults::{MOST_FAULTS, Places, Span};
+use crate::load::{self, LoadError, Reach};
 
 /// What a note is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -101,7 +101,9 @@ impl Notes {
     pub fn read(&self, path: &Path) -> Result<(usize, Rc<str>), String> {
         let in_file = |reason: String| format!("{}: {reason}", path.display());
         if self.sources.borrow().len() >= MOST_SOURCES {
-            return Err(in_file(format!("the scene includes more than {MOST_SOURCES} files, each counted as often as it is")));
+            return Err(in_file(format!(
+                "the scene includes more than {MOST_SOURCES} files, each counted as often as it is"
+            )));
         }
         let text = load::text_of(path).map_err(in_file)?;
         if self.read.get() + text.len() as u64 > load::MOST_TEXT {

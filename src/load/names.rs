@@ -70,7 +70,9 @@ impl<'a> Names<'a> {
         let known: Vec<_> = self.used.iter().map(String::as_str).collect();
         let unused = self.defines.iter().filter(|(name, _)| !self.used.contains(name));
         unused
-            .map(|(name, value)| format!("-D {name}={value} has no effect: the scene uses no ${name}; {}", list(&known)))
+            .map(|(name, value)| {
+                format!("-D {name}={value} has no effect: the scene uses no ${name}; {}", list(&known))
+            })
             .collect()
     }
 }

@@ -437,7 +437,10 @@ impl Reader<'_> {
         let Some(axes) = axes else { return Vec::new() };
         let count = axes.iter().try_fold(1usize, |count, (_, values)| count.checked_mul(values.len()));
         if count.is_none_or(|count| count > MOST_COMBINATIONS) {
-            self.fault(span, format!("its lists make more than {MOST_COMBINATIONS} methods, which is the most accepted"));
+            self.fault(
+                span,
+                format!("its lists make more than {MOST_COMBINATIONS} methods, which is the most accepted"),
+            );
             return Vec::new();
         }
         let combinations = grid(&axes);

@@ -22,7 +22,11 @@ fn entities_are_not_known_at_all() {
         around("<shape type='cube' id='&b;&c;'/>")
     );
     assert_faults(&text, &[], &["1:1: malformed XML: "]);
-    assert_faults(&around("<shape type='cube' id='&b;'/>"), &[], &["2:24: malformed XML: unknown entity reference 'b'"]);
+    assert_faults(
+        &around("<shape type='cube' id='&b;'/>"),
+        &[],
+        &["2:24: malformed XML: unknown entity reference 'b'"],
+    );
 }
 
 #[test]
@@ -115,7 +119,9 @@ fn headers_of_meshes_may_promise_anything() {
     let header = |count: &str| {
         let vertex = "property float x\nproperty float y\nproperty float z\n";
         let face = "property list uchar int vertex_indices\n";
-        format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{vertex}element face {count}\n{face}end_header\n")
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{vertex}element face {count}\n{face}end_header\n"
+        )
     };
     for count in ["4294967296", "18446744073709551615", "99999999999999999999", "-1", "1e9"] {
         let fault = load::mesh("ply", header(count).as_bytes()).unwrap_err();
@@ -276,7 +282,8 @@ fn conversions_are_confined_as_well() {
     let folder = around_a_scene();
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
                property list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-    let out = [("out.ply", ply), ("out.pbrt", ""), ("out.spd", "400 1\n700 1\n"), ("out.xml", "<scene version='0.6.0'/>")];
+    let out =
+        [("out.ply", ply), ("out.pbrt", ""), ("out.spd", "400 1\n700 1\n"), ("out.xml", "<scene version='0.6.0'/>")];
     for (name, content) in out {
         std::fs::write(folder.path(name), content).unwrap();
     }
@@ -297,7 +304,10 @@ fn conversions_are_confined_as_well() {
         converted(&folder, name, &text, Reach::Plain).unwrap_or_else(|fault| panic!("{text}\n{fault}"));
         let fault = converted(&folder, name, &text, Reach::Confined).unwrap_err();
         let file = fault.contains("out.");
-        assert!(file && fault.contains("it is outside of the scene's folder, which --confine forbids"), "{text}\n{fault}");
+        assert!(
+            file && fault.contains("it is outside of the scene's folder, which --confine forbids"),
+            "{text}\n{fault}"
+        );
     }
     let hidden = "<scene version='0.6.0'><default name='up' value='..'/><include filename='$up/out.xml'/></scene>";
     let fault = converted(&folder, "a.xml", hidden, Reach::Plain).unwrap_err();
@@ -322,5 +332,59 @@ fn files_that_include_one_another_many_times_over_come_to_an_end() {
         let fault = converted(&folder, name, &text, Reach::Plain).unwrap_err();
         assert!(fault.contains("the scene includes more than 16384 files, each counted as often as it is"), "{name}");
         assert!(fault.len() < 1_000_000, "{} bytes", fault.len());
+    }
+}
+
+#[test]
+fn what_a_conversion_nests_or_saves_is_bounded() {
+    let folder = around_a_scene();
+    let pbrt = |directives: &str| format!("Camera \"perspective\"\nWorldBegin\n{directives}\n");
+    let mix = |i: usize, of: usize| {
+        format!("MakeNamedMaterial \"m{i}\" \"string type\" \"mix\" \"string materials\" [\"m{of}\" \"m{of}\"]\n")
+    };
+    let mixes: String = (1..40).map(|i| mix(i, i - 1)).collect();
+    let parameters: String = (0..257).map(|i| format!(" \"float p{i}\" 1")).collect();
+    let old = |elements: &str| format!("<scene version='0.6.0'>{elements}<sensor type='perspective'/></scene>");
+    let of_itself = "<texture type='scale' id='a'><ref id='a'/></texture>\
+                     <bsdf type='diffuse'><ref name='reflectance' id='a'/></bsdf>";
+    let cases = [
+        (
+            "a.pbrt",
+            pbrt(&"AttributeBegin\n".repeat(1025)),
+            "AttributeBegin inside of 1024 others, which is the most accepted",
+        ),
+        ("a.pbrt", pbrt(&format!("Attribute \"shape\"{parameters}")), "adds more than 256 parameters"),
+        ("a.pbrt", pbrt(&(mixes + "NamedMaterial \"m39\"\nShape \"sphere\"")), "or of more than 8 inside one another"),
+        (
+            "a.pbrt",
+            pbrt(&(mix(1, 1) + "NamedMaterial \"m1\"\nShape \"sphere\"")),
+            "the material is a mixture of itself",
+        ),
+        ("a.xml", old(of_itself), "the texture is made of itself, or of more than 8 inside one another"),
+        ("a.xml", old(&"<bsdf type='twosided'>".repeat(66)), "malformed XML"),
+        ("a.xml", old(&("<a>".repeat(66) + &"</a>".repeat(66))), "elements are nested deeper than 64 levels"),
+    ];
+    for (name, text, message) in cases {
+        let fault = converted(&folder, name, &text, Reach::Plain).unwrap_err();
+        assert!(fault.contains(message), "{message}\n{}", &fault[..fault.len().min(2000)]);
+        assert!(fault.len() < 1_000_000, "{message}: {} bytes of messages", fault.len());
+    }
+}
+
+#[test]
+fn studies_do_not_grow_without_bounds() {
+    let folder = Folder::new(&[]);
+    let lists: String = (0..30).map(|i| format!("a{i} = [1, 2, 3]\n")).collect();
+    for (head, method, message) in [
+        ("", &lists[..], "its lists make more than 10000 methods, which is the most accepted"),
+        ("seeds = 9223372036854775807", "", "`seeds` are more than 10000, which is the most accepted"),
+        ("note = \"\\uD800\"", "", "a.toml:"),
+    ] {
+        let path = folder.path("a.toml");
+        let text = format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'a.xml'\n[[method]]\n{method}");
+        std::fs::write(&path, text.replacen("mpp", &format!("{head}\nmpp"), usize::from(!head.is_empty()))).unwrap();
+        let read = relt::study::file::read(&path, &|_| Ok(relt::render::Settings::default()));
+        let fault = read.unwrap_err().to_string();
+        assert!(fault.contains(message), "{message}\n{fault}");
     }
 }

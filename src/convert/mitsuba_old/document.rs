@@ -113,12 +113,8 @@ const MAX_ALIASES: usize = 64;
 
 /// Reads a scene file; `defines` go before the defaults in it.
 pub fn read(path: &Path, text: &str, source: usize, defines: &[(String, String)], notes: &Notes) -> Option<Document> {
-    let mut reader = Reader {
-        notes,
-        names: Names::new(defines),
-        aliases: HashMap::new(),
-        files: vec![path.to_owned()],
-    };
+    let mut reader =
+        Reader { notes, names: Names::new(defines), aliases: HashMap::new(), files: vec![path.to_owned()] };
     let scene = reader.file(text, source, 0)?;
     reader.names.unused().into_iter().for_each(|message| notes.fault(&scene.place, message));
     Some(Document { scene, aliases: reader.aliases })

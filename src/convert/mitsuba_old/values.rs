@@ -1,11 +1,11 @@
 //! Attribute text to numbers and colours.
 
 use super::document::Node;
-use crate::load;
 use crate::convert::Rgb;
 use crate::convert::notes::Notes;
 use crate::convert::spectra::{self, Spectrum, linear_of_srgb};
 use crate::convert::values::{exactly, number, numbers};
+use crate::load;
 
 /// Tags of colours.
 pub const COLOURS: &[&str] = &["rgb", "srgb", "spectrum", "blackbody", "xyz", "float", "integer", "color"];

@@ -265,7 +265,8 @@ fn attribute(state: &mut State, list: Parameters, notes: &Notes) {
             .fault(&list.place, format!("Attribute of {:?}; {}", list.kind, crate::load::faults::list(&known)));
     }
     if state.now.attributes.len() + list.list.len() > MOST_ATTRIBUTES {
-        let message = format!("Attribute: with these it adds more than {MOST_ATTRIBUTES} parameters, which is the most accepted");
+        let message =
+            format!("Attribute: with these it adds more than {MOST_ATTRIBUTES} parameters, which is the most accepted");
         return notes.fault(&list.place, message);
     }
     state.now.attributes.extend(list.list.into_iter().map(|parameter| (list.kind.clone(), parameter)));

@@ -1,10 +1,10 @@
 //! Colours, refractive indices and metals as pbrt gives them.
 
 use super::parameters::{Parameter, Parameters, Values};
-use crate::load;
 use crate::convert::Rgb;
 use crate::convert::notes::Notes;
 use crate::convert::spectra::{Spectrum, blackbody_hue};
+use crate::load;
 
 /// What a colour is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,9 +69,7 @@ fn named(name: &str, of: Of, notes: &Notes) -> Result<Rgb, String> {
     let path = notes.file(&notes.home(), name, true)?;
     match load::text_of(&path) {
         Ok(text) => Spectrum::of_file(&text).map(|s| colour_of(&s, of)).map_err(|m| format!("{}: {m}", path.display())),
-        Err(error) => {
-            Err(format!("the spectrum {name:?} is not known by name, and {} {error}", path.display()))
-        }
+        Err(error) => Err(format!("the spectrum {name:?} is not known by name, and {} {error}", path.display())),
     }
 }
 

@@ -68,7 +68,15 @@ impl State {
             attributes: Vec::new(),
         };
         let world = World { start: Some(start), ..World::default() };
-        State { world, now, saved: Vec::new(), objects: HashSet::new(), systems: HashMap::new(), object: None, is_in_world: false }
+        State {
+            world,
+            now,
+            saved: Vec::new(),
+            objects: HashSet::new(),
+            systems: HashMap::new(),
+            object: None,
+            is_in_world: false,
+        }
     }
 
     /// The world, at the end of the file.

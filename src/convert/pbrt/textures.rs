@@ -54,7 +54,10 @@ impl Converter<'_> {
             return None;
         };
         if depth > MAX_NESTING {
-            self.notes.fault(&parameter.place, format!("the texture {name:?} is made of itself, or of more than {MAX_NESTING} inside one another"));
+            self.notes.fault(
+                &parameter.place,
+                format!("the texture {name:?} is made of itself, or of more than {MAX_NESTING} inside one another"),
+            );
             return None;
         }
         let key = (name.to_owned(), kind);

@@ -23,8 +23,8 @@ mod values;
 
 use std::path::{Path, PathBuf};
 
-use super::faults::{Faults, did_you_mean};
 use super::access::Access;
+use super::faults::{Faults, did_you_mean};
 use super::{LoadError, Reach, Watch};
 use crate::scene::SceneDescription;
 use crate::scene::lights::Light;
