@@ -1,5 +1,5 @@
-//! Files that once ended the program, or kept it busy or hungry without end, in `tests/corpora`: what `fuzz/run.sh` found,
-//! and what reading the source did. A folder a target of `fuzz/targets`, which read them in the same way.
+//! Files that would end the program, or keep it busy or hungry without end, in `tests/corpora`: those that were found by
+//! reading the source, and a place for what `fuzz/run.sh` finds. A folder a target of `fuzz/targets`, which read alike.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -334,3 +334,57 @@ fn files_that_include_one_another_many_times_over_come_to_an_end() {
         assert!(fault.len() < 1_000_000, "{} bytes", fault.len());
     }
 }
+
+#[test]
+fn what_a_conversion_nests_or_saves_is_bounded() {
+    let folder = around_a_scene();
+    let pbrt = |directives: &str| format!("Camera \"perspective\"\nWorldBegin\n{directives}\n");
+    let mix = |i: usize, of: usize| {
+        format!("MakeNamedMaterial \"m{i}\" \"string type\" \"mix\" \"string materials\" [\"m{of}\" \"m{of}\"]\n")
+    };
+    let mixes: String = (1..40).map(|i| mix(i, i - 1)).collect();
+    let parameters: String = (0..257).map(|i| format!(" \"float p{i}\" 1")).collect();
+    let old = |elements: &str| format!("<scene version='0.6.0'>{elements}<sensor type='perspective'/></scene>");
+    let of_itself = "<texture type='scale' id='a'><ref id='a'/></texture>\
+                     <bsdf type='diffuse'><ref name='reflectance' id='a'/></bsdf>";
+    let cases = [
+        (
+            "a.pbrt",
+            pbrt(&"AttributeBegin\n".repeat(1025)),
+            "AttributeBegin inside of 1024 others, which is the most accepted",
+        ),
+        ("a.pbrt", pbrt(&format!("Attribute \"shape\"{parameters}")), "adds more than 256 parameters"),
+        ("a.pbrt", pbrt(&(mixes + "NamedMaterial \"m39\"\nShape \"sphere\"")), "or of more than 8 inside one another"),
+        (
+            "a.pbrt",
+            pbrt(&(mix(1, 1) + "NamedMaterial \"m1\"\nShape \"sphere\"")),
+            "the material is a mixture of itself",
+        ),
+        ("a.xml", old(of_itself), "the texture is made of itself, or of more than 8 inside one another"),
+        ("a.xml", old(&"<bsdf type='twosided'>".repeat(66)), "malformed XML"),
+        ("a.xml", old(&("<a>".repeat(66) + &"</a>".repeat(66))), "elements are nested deeper than 64 levels"),
+    ];
+    for (name, text, message) in cases {
+        let fault = converted(&folder, name, &text, Reach::Plain).unwrap_err();
+        assert!(fault.contains(message), "{message}\n{}", &fault[..fault.len().min(2000)]);
+        assert!(fault.len() < 1_000_000, "{message}: {} bytes of messages", fault.len());
+    }
+}
+
+#[test]
+fn studies_do_not_grow_without_bounds() {
+    let folder = Folder::new(&[]);
+    let lists: String = (0..30).map(|i| format!("a{i} = [1, 2, 3]\n")).collect();
+    for (head, method, message) in [
+        ("", &lists[..], "its lists make more than 10000 methods, which is the most accepted"),
+        ("seeds = 9223372036854775807", "", "`seeds` are more than 10000, which is the most accepted"),
+        ("note = \"\\uD800\"", "", "a.toml:"),
+    ] {
+        let path = folder.path("a.toml");
+        let text = format!("title = 'a'\nmpp = 1\n[[scene]]\nfile = 'a.xml'\n[[method]]\n{method}");
+        std::fs::write(&path, text.replacen("mpp", &format!("{head}\nmpp"), usize::from(!head.is_empty()))).unwrap();
+        let read = relt::study::file::read(&path, &|_| Ok(relt::render::Settings::default()));
+        let fault = read.unwrap_err().to_string();
+        assert!(fault.contains(message), "{message}\n{fault}");
+    }
+}
