@@ -56,6 +56,9 @@ fn square(x: f64) -> f64 {
 
 /// Cosines are kept from 0, which makes densities infinite: a ray that grazes a surface hit it all the same.
 const LEAST_COSINE: f64 = 1e-12;
+/// Squares of distances likewise: what leaves one wall within 2⁻¹⁶ of a corner may start right on the other and meet it there,
+/// at a distance whose square is 0. Where rays start off surfaces is known to a billion times as much as this length.
+const LEAST_DISTANCE2: f64 = LEAST_COSINE * LEAST_COSINE;
 
 impl Tail {
     /// R_j, what the techniques with a shorter subpath count: with ←p_j = `reverse_density` per area and ←ω_j =
@@ -91,7 +94,7 @@ impl Step {
     /// Arrives at a vertex at the square of that distance; `cos` of the edge by its geometric normal.
     #[inline(always)]
     pub fn arrive(&self, distance2: f32, cos: f32) -> Tail {
-        let distance2 = f64::from(distance2);
+        let distance2 = f64::from(distance2).max(LEAST_DISTANCE2);
         Tail {
             inverse_density: distance2 / (self.density * f64::from(cos).max(LEAST_COSINE)),
             shorter: self.shorter,
@@ -129,6 +132,22 @@ mod tests {
         path::bidirectional::Techniques,
         rng::{Counter, Purpose, Rng, open_unit_f64},
     };
+
+    /// In a corner; the path goes on from there.
+    #[test]
+    fn an_edge_without_length_leaves_weights_that_are_numbers() {
+        let start = Tail { inverse_density: 2.0, shorter: 1.0, earlier: 0.5 };
+        for distance2 in [0.0, 1e-44, 1e-30] {
+            let corner = start.leave(Some([0.2, 0.3]), 0.7, true).arrive(distance2, 0.7);
+            let next = corner.leave(Some([0.2, 0.3]), 0.7, true).arrive(1.0, 0.7);
+            for tail in [corner, next] {
+                for reverse_density in [0.0, 1e-20, 0.1, 1e20] {
+                    let w = weight(tail.others(reverse_density, 0.3, true));
+                    assert!((0.0..=1.0).contains(&w), "{w} at {distance2}, {tail:?}");
+                }
+            }
+        }
+    }
 
     /// A path x₀ … x_n by its densities: those of directions onwards to the lens and back to the light, cosines towards
     /// both neighbours, squared distances, and which vertices scatter perfectly.
