@@ -483,7 +483,7 @@ mod tests {
     fn rows_of_a_table_are_jobs() {
         let text = "scene, output, mpp, define.res, layers, frames\n\
                     s.xml, a-{res}.exr, 4, 32, true,\n\
-                    s.xml, \"b,{frame}.exr\", , , , -1..0\n";
+                    s.xml,\"b,{frame}.exr\", , , , -1..0\n";
         let jobs = read_text("j.csv", text).unwrap();
         let names: Vec<&str> = jobs.iter().map(|job| job.name.as_str()).collect();
         assert_eq!(names, ["a-32.exr", "b,-1.exr", "b,0.exr"]);

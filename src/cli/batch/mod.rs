@@ -23,7 +23,7 @@ use crate::film::file::write_whole;
 
 /// Renders all jobs of a file: scenes, frames, and sweeps over options and parameters of scenes
 ///
-/// The file is TOML, with [defaults] and a [[job]] for each image or for each list of values, or CSV with a row for each
+/// The file is TOML, with a table `defaults` and one `job` for each image or each list of values, or CSV with a row for each
 /// image; keys are the options of relt render. What happened to each job is kept in JOBS.queue, and the same command goes on
 /// where it was stopped or killed. A job that fails keeps no other from being done
 #[derive(Args)]

@@ -137,6 +137,11 @@ impl<'a> Runner<'a> {
         let ended = isolated(|| self.attempt(index, goes_on, turn, asked, &begun));
         turn.end();
         self.scenes.release(job);
+        match (&ended, begun.load(Relaxed)) {
+            (Ok(_), false) => return, // stopped before it was its turn
+            (Err(_), false) => self.note(job, Event::Begun),
+            (_, true) => {}
+        }
         let name = &job.entry.name;
         let (event, words) = match ended {
             Ok(End::Done(found)) => {
@@ -164,12 +169,6 @@ impl<'a> Runner<'a> {
         match event {
             Event::Failed { .. } => self.display.say(&words),
             _ => self.display.done(&format!("{}/{} {words}", done + failed, self.due.len())),
-        }
-        if !begun.load(Relaxed) {
-            match event {
-                Event::Failed { .. } => self.note(job, Event::Begun),
-                _ => return, // it was not its turn yet
-            }
         }
         let is_done = matches!(event, Event::Done(_));
         self.note(job, event);
