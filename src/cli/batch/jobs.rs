@@ -29,17 +29,20 @@ pub(super) struct BatchJob {
 }
 
 /// Options that the batch itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 8] = ["help", "version", "define", "output", "resume", "part", "quiet", "verbose"];
+const NOT_OPTIONS: [&str; 9] = ["help", "version", "define", "output", "resume", "part", "quiet", "verbose", "confine"];
 
 /// Reads a file of jobs; everything that is wrong with it, or with jobs that would write one another's files or those that
-/// are `taken`.
-pub(super) fn read(path: &Path, taken: &[&Path]) -> Result<Vec<BatchJob>, Failure> {
+/// are `taken`. Where they are to be confined, scenes are read from their own folders only.
+pub(super) fn read(path: &Path, taken: &[&Path], confine: bool) -> Result<Vec<BatchJob>, Failure> {
     let options = render::options().into_iter().filter(|(name, _)| !NOT_OPTIONS.contains(&name.as_str()));
     let known: Vec<Known> = options.map(|(name, is_flag)| Known { name, is_flag }).collect();
-    let entries = file::read(path, &known).map_err(|error| match error {
+    let mut entries = file::read(path, &known).map_err(|error| match error {
         BatchError::Content(faults) => Failure::Input(faults),
         BatchError::File(error) => Failure::input(error),
     })?;
+    if confine {
+        entries.iter_mut().for_each(|entry| entry.options.push("--confine".into()));
+    }
     let place = |path: &Path| tidy(&absolute(path).unwrap_or_else(|_| path.to_owned()));
     let mut written: BTreeMap<PathBuf, String> =
         taken.iter().map(|path| (place(path), "the batch itself needs it".into())).collect();
@@ -141,7 +144,7 @@ mod tests {
         let path = folder.path().join("j.toml");
         fs::write(&path, text).unwrap();
         let plain = |text: String| text.replace(&format!("{}/", folder.path().display()), "");
-        read(&path, &[&path]).map_err(|failure| plain(failure.plain()))
+        read(&path, &[&path], false).map_err(|failure| plain(failure.plain()))
     }
 
     #[test]

@@ -46,6 +46,10 @@ pub(super) struct Batch {
     #[arg(long)]
     keep_order: bool,
 
+    /// Reads files of each scene's own folder only; without, also others that the scene names plainly
+    #[arg(long)]
+    confine: bool,
+
     /// Table of all jobs to write, CSV [default: the job file's name with .summary.csv]
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
@@ -63,7 +67,7 @@ pub(super) struct Batch {
 pub(super) fn run(arguments: Batch) -> Result<(), Failure> {
     let begin = Instant::now();
     let (queue_path, summary_path) = (Queue::path_of(&arguments.file), arguments.summary_path());
-    let jobs = jobs::read(&arguments.file, &[&arguments.file, &queue_path, &summary_path])?;
+    let jobs = jobs::read(&arguments.file, &[&arguments.file, &queue_path, &summary_path], arguments.confine)?;
     if arguments.dry_run {
         let (standings, _) = queue::read(&queue_path).map_err(Failure::input)?;
         list(&jobs, &standings);
