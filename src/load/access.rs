@@ -3,6 +3,7 @@
 //! A scene file names others: meshes, pictures, files that it includes. Whoever renders a scene of somebody else's wants to
 //! know what it reads. So only files are read, no devices or pipes, and from outside of the scene's folder only what the
 //! scene names plainly, or nothing at all with [`Reach::Confined`].
+
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
