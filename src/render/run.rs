@@ -1,4 +1,4 @@
-//! The render loop: slices of sweeps until the budget is spent.
+//! The render loop: slices of mutations until the budget is spent.
 
 use std::{
     convert::Infallible,
@@ -88,8 +88,9 @@ pub enum RenderError {
     },
 }
 
-/// How long a slice of sweeps should take: often enough for progress, snapshots and Ctrl-C, and long beside the
-/// moment at its end when threads wait for the last of them.
+/// How long a slice should take: often enough for progress, snapshots and Ctrl-C, and long beside the moment at its end
+/// when threads wait for the last of them. Slices are counted in mutations, as a sweep may become many times as long from
+/// one round to the next.
 const SLICE: Duration = Duration::from_millis(200);
 /// What a slice is cut to, at the least, where a look is due.
 const SHORTEST_SLICE: Duration = Duration::from_millis(2);
@@ -305,6 +306,7 @@ fn work(
 ) -> bool {
     let mut slice = 1;
     loop {
+        let done = engine.counts().mutations;
         let left = engine.sweeps_left().unwrap_or(u64::MAX);
         let time_left = job.settings.time.map_or(Duration::MAX, |time| time.saturating_sub(watch.clock.elapsed()));
         if left == 0 || time_left.is_zero() {
@@ -314,14 +316,12 @@ fn work(
             return true;
         }
         let (until, look_in) = match observer.next_stop() {
-            Some(Stop::Mutations(mutations)) if mutations > engine.counts().mutations => {
-                (Some(mutations), Duration::MAX)
-            }
-            Some(Stop::Time(time)) => (None, time.saturating_sub(watch.clock.elapsed())),
-            _ => (None, Duration::MAX),
+            Some(Stop::Mutations(mutations)) if mutations > done => (mutations, Duration::MAX),
+            Some(Stop::Time(time)) => (u64::MAX, time.saturating_sub(watch.clock.elapsed())),
+            _ => (u64::MAX, Duration::MAX),
         };
         let (phase, slice_begin) = (engine.phase(), watch.clock.elapsed());
-        let sweeps = engine.advance(stage, slice.min(left), until);
+        engine.advance(stage, left, Some(until.min(done + slice)));
         let took = watch.clock.elapsed() - slice_begin;
         match phase {
             Phase::Bootstrap => watch.set_up.bootstrap += took,
@@ -331,9 +331,10 @@ fn work(
         // the next slice fills its time, or what is left until the next look or of the run's time
         let time_left = job.settings.time.map_or(SLICE, |time| time.saturating_sub(watch.clock.elapsed()));
         let next = SLICE.min(time_left).min(look_in.saturating_sub(took).max(SHORTEST_SLICE));
-        if sweeps > 0 {
-            let a_sweep = took.as_secs_f64() / sweeps as f64;
-            slice = ((next.as_secs_f64() / a_sweep) as u64).clamp(1, 2 * slice);
+        let gone = engine.counts().mutations - done;
+        if gone > 0 {
+            let a_mutation = took.as_secs_f64() / gone as f64;
+            slice = ((next.as_secs_f64() / a_mutation) as u64).clamp(1, 2 * gone);
         }
 
         let rounds: Vec<_> = engine.take_reports().into_iter().map(Arc::new).collect();
@@ -495,7 +496,8 @@ mod tests {
             Some(3)
         }
 
-        fn advance(&mut self, _: &Stage, sweeps: u64, _: Option<u64>) -> u64 {
+        fn advance(&mut self, _: &Stage, sweeps: u64, until: Option<u64>) -> u64 {
+            let sweeps = sweeps.min(until.map_or(u64::MAX, |until| until - self.sweeps));
             for sweep in self.sweeps..self.sweeps + sweeps {
                 let ended = [&[0, 1][..], &[2], &[]][sweep as usize];
                 self.reports.extend(ended.iter().map(|&round| RoundReport { round, ..RoundReport::default() }));

@@ -54,8 +54,7 @@ fn a_run_goes_on_while_the_disk_is_full_and_loses_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let intervals = ["--time", "10m", "--snapshot", "100ms", "--checkpoint", "100ms", "--threads", "1"];
-    // independent samples take the same time all along: there is a line of the log for every second
-    let files = ["--method", "path", "--log", "run.jsonl", "-o", "a.exr"];
+    let files = ["--log", "run.jsonl", "-o", "a.exr"];
     let child = limited(folder.path(), &["--fsize=1000:"], &[&intervals[..], &files].concat()).spawn().unwrap();
     wait_until("a log up to its limit", || at("run.jsonl").metadata().is_ok_and(|file| file.len() == 1000));
     std::thread::sleep(Duration::from_millis(2500)); // snapshots, checkpoints and lines of the log are refused
