@@ -310,6 +310,7 @@ impl<W: Default + Send> Block<W> {
     }
 
     /// Offers each fresh point to the lowest chain of its ladder, a swap that costs nothing.
+    #[inline(never)] // profiles tell what it takes
     fn inject(&mut self, canvas: &Canvas, round: &Round) {
         let replicas = self.rung.len();
         let lowest = round.ladder.betas()[1];
@@ -343,6 +344,7 @@ impl<W: Default + Send> Block<W> {
 
     /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones; a part of
     /// [`advance`](Self::advance).
+    #[inline(never)] // profiles tell what it takes
     pub fn swap(&mut self, canvas: &Canvas, round: &Round) {
         let rng = self.parts[0].evaluator.rng();
         let betas = round.ladder.betas();
