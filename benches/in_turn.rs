@@ -62,9 +62,17 @@ fn main() {
     let wanted = Wanted::from_arguments();
     type Group = fn(&Wanted, &str) -> Vec<String>;
     let groups: [(&str, &str, Group); 4] = [
-        ("embree", "Million mutations a second of runs, by bare Embree on the same rays, and the share of the latter", embree),
+        (
+            "embree",
+            "Million mutations a second of runs, by bare Embree on the same rays, and the share of the latter",
+            embree,
+        ),
         ("rungs", "Million mutations a second on ladders of K rungs (and by those of 2)", rungs),
-        ("threads", "Million mutations a second of wall time (and by those of one thread); share of two threads' time idle", threads),
+        (
+            "threads",
+            "Million mutations a second of wall time (and by those of one thread); share of two threads' time idle",
+            threads,
+        ),
         ("kernels", "Million mutations a second by kernel (and by those of the full one)", kernels),
     ];
     for (name, title, group) in groups {
@@ -140,10 +148,8 @@ fn in_turn(wanted: &Wanted, contenders: &mut [Contender]) -> Vec<Vec<Turn>> {
         for i in order {
             let (wall, cpu) = (Instant::now(), cpu_time());
             let done = contenders[i](wanted.turn());
-            turns[i].push(Turn {
-                cpu: (cpu_time() - cpu).as_secs_f64() / done,
-                wall: wall.elapsed().as_secs_f64() / done,
-            });
+            turns[i]
+                .push(Turn { cpu: (cpu_time() - cpu).as_secs_f64() / done, wall: wall.elapsed().as_secs_f64() / done });
         }
     }
     turns
@@ -260,7 +266,10 @@ fn settings(method: Method) -> Settings {
 
 /// The scenes; the first only, where everything is only tried.
 fn subjects(wanted: &Wanted) -> Vec<Subject> {
-    support::SCENES[..if wanted.smoke { 1 } else { support::SCENES.len() }].iter().map(|name| Subject::new(name)).collect()
+    support::SCENES[..if wanted.smoke { 1 } else { support::SCENES.len() }]
+        .iter()
+        .map(|name| Subject::new(name))
+        .collect()
 }
 
 fn pool(threads: usize, pin: bool) -> rayon::ThreadPool {
@@ -339,24 +348,30 @@ fn rungs(wanted: &Wanted, group: &str) -> Vec<String> {
             let turns = pool.install(|| {
                 let samples = samples(&mapping);
                 let ladders = ALL.map(|rungs| RefCell::new(ladders(&mapping, rungs, alike, &samples)));
-                let work = |i: usize| -> Contender { Box::new({
-                    let (ladders, mapping) = (&ladders[i], &mapping);
-                    move |turn| {
-                        let (begin, mut done) = (Instant::now(), 0);
-                        let mut ladders = ladders.borrow_mut();
-                        while done == 0 || begin.elapsed() < turn {
-                            ladders.work(|block, canvas, round| block.advance(mapping, 16, canvas, round));
-                            done += 16 * ladders.lanes();
+                let work = |i: usize| -> Contender {
+                    Box::new({
+                        let (ladders, mapping) = (&ladders[i], &mapping);
+                        move |turn| {
+                            let (begin, mut done) = (Instant::now(), 0);
+                            let mut ladders = ladders.borrow_mut();
+                            while done == 0 || begin.elapsed() < turn {
+                                ladders.work(|block, canvas, round| block.advance(mapping, 16, canvas, round));
+                                done += 16 * ladders.lanes();
+                            }
+                            done as f64
                         }
-                        done as f64
-                    }
-                })};
+                    })
+                };
                 let mut contenders: Vec<Contender> = (0..ALL.len()).map(work).collect();
                 in_turn(wanted, &mut contenders)
             });
             for (rungs, of) in ALL.iter().zip(&turns) {
                 let (many, by) = (millions(of, |turn| turn.cpu), ratio(&turns[0], of, |turn| turn.cpu));
-                rows.push(format!("| `{}` | {} | {rungs} | {many:.3} | {by} |", subject.name, if alike { "alike" } else { "even" }));
+                rows.push(format!(
+                    "| `{}` | {} | {rungs} | {many:.3} | {by} |",
+                    subject.name,
+                    if alike { "alike" } else { "even" }
+                ));
             }
         }
     }
@@ -393,7 +408,9 @@ fn threads(wanted: &Wanted, group: &str) -> Vec<String> {
     let mut rows = Vec::new();
     for subject in subjects(wanted) {
         for method in [Method::Path, Method::Mlt, Method::ReplicaExchange] {
-            if !wanted.has(&format!("{group}/{}/{}", method.name(), subject.name)) || wanted.smoke && method != Method::Path {
+            if !wanted.has(&format!("{group}/{}/{}", method.name(), subject.name))
+                || wanted.smoke && method != Method::Path
+            {
                 continue;
             }
             let kind = MappingKind::Unidirectional;

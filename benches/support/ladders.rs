@@ -110,7 +110,8 @@ pub fn samples<T: Target>(target: &T) -> Vec<Start> {
         let mut evaluator = Evaluator::<T::Workspace>::new(Rng::new(0), counters);
         evaluator.moves.fill(Move::Fresh);
         evaluator.evaluate(target, &Points::new(0));
-        let start = |(counter, state): (&Counter, &relt::path::Contribution)| Start { counter: *counter, ln_g: state.ln_g };
+        let start =
+            |(counter, state): (&Counter, &relt::path::Contribution)| Start { counter: *counter, ln_g: state.ln_g };
         evaluator.counters.iter().zip(&evaluator.out.lanes).map(start).collect::<Vec<_>>()
     };
     (0..SAMPLES / LANES).flat_map(batch).collect()

@@ -2,7 +2,6 @@
 
 #![allow(dead_code, reason = "no benchmark uses all of it")]
 
-
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Duration;
