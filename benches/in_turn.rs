@@ -9,7 +9,7 @@
 //!   Embree reaches on the very same rays: recorded from that run and traced again in their batches, each kind at the
 //!   packet width that is fastest for it. Their ratio is the share of its time that a run could not do without.
 //! - `in-turn/rungs` has whole sweeps of blocks of ladders on scenes, with as many chains and as large a share of uniform
-//!   points whatever the number of rungs. `alike` ladders have rungs at β from 0.99 to 1, which all sample the same paths, so
+//!   points whatever the number of rungs, and the share of the time that swaps take. `alike` ladders have rungs at β from 0.99 to 1, which all sample the same paths, so
 //!   that ladders are compared and not what chains prefer; nearly all their swaps are accepted, which makes them dear.
 //! - `in-turn/threads` has two threads against one, by wall time, pinned to cores and not, and the part of their time in
 //!   which two threads idle.
@@ -25,9 +25,10 @@ use std::{
 };
 
 use relt::{
+    chain::Start,
     embree::Hits,
     film::Footprint,
-    path::{Mapping, MappingKind, RecordedRays},
+    path::{Mapping, MappingKind, RecordedRays, Widths, Workspace},
     render::{
         self, LadderChoice, Method, Settings,
         calibration::fastest_for,
@@ -67,7 +68,11 @@ fn main() {
             "Million mutations a second of runs, by bare Embree on the same rays, and the share of the latter",
             embree,
         ),
-        ("rungs", "Million mutations a second on ladders of K rungs (and by those of 2)", rungs),
+        (
+            "rungs",
+            "Million mutations a second on ladders of K rungs (and by those of 2); share of the time for swaps",
+            rungs,
+        ),
         (
             "threads",
             "Million mutations a second of wall time (and by those of one thread); share of two threads' time idle",
@@ -321,7 +326,7 @@ fn a_run_and_its_rays(wanted: &Wanted, subject: &Subject, mapping: MappingKind, 
 }
 
 /// Traces those rays for a turn; how often.
-fn trace(turn: Duration, scene: &Scene, rays: &RecordedRays, widths: relt::path::Widths) -> f64 {
+fn trace(turn: Duration, scene: &Scene, rays: &RecordedRays, widths: Widths) -> f64 {
     let (begin, mut times) = (Instant::now(), 0.0);
     let (mut hits, mut occluded) = (Hits::default(), Vec::new());
     while times == 0.0 || begin.elapsed() < turn {
@@ -335,6 +340,8 @@ fn trace(turn: Duration, scene: &Scene, rays: &RecordedRays, widths: relt::path:
 /// Ladders of all lengths.
 fn rungs(wanted: &Wanted, group: &str) -> Vec<String> {
     const ALL: [usize; 5] = [2, 4, 8, 16, 32];
+    /// Sweeps between two deposits on the film.
+    const SWEEPS: usize = 16;
     let pool = pool(1, false);
     let mut rows = Vec::new();
     for subject in subjects(wanted) {
@@ -347,44 +354,43 @@ fn rungs(wanted: &Wanted, group: &str) -> Vec<String> {
             let mapping = Mapping::new(subject.scene(), kind, subject.widths(kind));
             let turns = pool.install(|| {
                 let samples = samples(&mapping);
-                let ladders = ALL.map(|rungs| RefCell::new(ladders(&mapping, rungs, alike, &samples)));
-                let work = |i: usize| -> Contender {
-                    Box::new({
-                        let (ladders, mapping) = (&ladders[i], &mapping);
-                        move |turn| {
-                            let (begin, mut done) = (Instant::now(), 0);
-                            let mut ladders = ladders.borrow_mut();
-                            while done == 0 || begin.elapsed() < turn {
-                                ladders.work(|block, canvas, round| block.advance(mapping, 16, canvas, round));
-                                done += 16 * ladders.lanes();
+                // a second phase of swaps after every sweep tells what one takes
+                let ladders =
+                    ALL.map(|rungs| [(); 2].map(|()| RefCell::new(ladders(&mapping, rungs, alike, &samples))));
+                let work = |(ladders, again): (&RefCell<Ladders<Workspace>>, bool), turn: Duration| {
+                    let (begin, mut done, mut ladders) = (Instant::now(), 0, ladders.borrow_mut());
+                    while done == 0 || begin.elapsed() < turn {
+                        ladders.work(|block, canvas, round| {
+                            for _ in 0..SWEEPS {
+                                block.advance(&mapping, 1, canvas, round);
+                                if again {
+                                    block.swap(canvas, round);
+                                }
                             }
-                            done as f64
-                        }
-                    })
+                        });
+                        done += SWEEPS * ladders.lanes();
+                    }
+                    done as f64
                 };
-                let mut contenders: Vec<Contender> = (0..ALL.len()).map(work).collect();
+                let each = ladders.iter().flat_map(|[once, twice]| [(once, false), (twice, true)]);
+                let mut contenders: Vec<Contender> =
+                    each.map(|each| -> Contender { Box::new(move |turn| work(each, turn)) }).collect();
                 in_turn(wanted, &mut contenders)
             });
-            for (rungs, of) in ALL.iter().zip(&turns) {
-                let (many, by) = (millions(of, |turn| turn.cpu), ratio(&turns[0], of, |turn| turn.cpu));
-                rows.push(format!(
-                    "| `{}` | {} | {rungs} | {many:.3} | {by} |",
-                    subject.name,
-                    if alike { "alike" } else { "even" }
-                ));
+            for (rungs, of) in ALL.iter().zip(turns.chunks(2)) {
+                let (many, by) = (millions(&of[0], |turn| turn.cpu), ratio(&turns[0], &of[0], |turn| turn.cpu));
+                let swaps = median(of[1].iter().zip(&of[0]).map(|(twice, once)| 1.0 - once.cpu / twice.cpu));
+                let kind = if alike { "alike" } else { "even" };
+                rows.push(format!("| `{}` | {kind} | {rungs} | {many:.3} | {by} | {swaps:.3} |", subject.name));
             }
         }
     }
-    if rows.is_empty() { rows } else { [head(&["scene", "rungs", "K", "mutations", "by K = 2"]), rows].concat() }
+    let columns = ["scene", "rungs", "K", "mutations", "by K = 2", "swaps"];
+    if rows.is_empty() { rows } else { [head(&columns), rows].concat() }
 }
 
 /// Blocks of ladders on a scene.
-fn ladders(
-    mapping: &Mapping,
-    rungs: usize,
-    alike: bool,
-    samples: &[relt::chain::Start],
-) -> Ladders<relt::path::Workspace> {
+fn ladders(mapping: &Mapping, rungs: usize, alike: bool, samples: &[Start]) -> Ladders<Workspace> {
     let film = mapping.scene().film;
     let film = Film {
         footprint: Footprint::new(film.filter, film.width, film.height),
