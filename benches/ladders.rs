@@ -11,29 +11,27 @@ use std::time::Duration;
 use criterion::{
     BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime,
 };
-use rayon::prelude::*;
 use relt::{
-    chain::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Recorder, Start, Target, resample},
+    chain::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Recorder, Target, resample},
     film::{Accumulator, Filter, Footprint, Splats},
     path::{Contribution, Contributions},
-    rng::{Counter, Purpose, Rng, unit_f32},
+    rng::{Rng, unit_f32},
     sample::Proposals,
     scene::Rgb,
-    tempering::{Block, Canvas, Choices, Combine, Ladder, Layers, PointGroups, Round, StepMix, Weights},
+    tempering::Ladder,
 };
+use support::ladders::{CHAINS, Film, Ladders, ladders_a_block, samples};
+
+mod support;
 
 /// Time that criterion runs each benchmark for before it measures, and while.
 const WARM_UP: Duration = Duration::from_millis(200);
 const MEASUREMENT: Duration = Duration::from_millis(800);
 /// Few enough for plots to be drawn in a moment (`benches/support`).
 const RESAMPLES: usize = 10_000;
-/// Chains of a block, on ladders of any length.
-const CHAINS: usize = 192;
 /// Blocks that threads share.
 const BLOCKS: usize = 8;
 const FILM: u32 = 256;
-/// Centre of the sizes of steps, in scales.
-const STEPS: f64 = 2.0;
 
 /// g(x) = 4 x², in grey; the film position is the rest of the block.
 struct Free;
@@ -49,70 +47,6 @@ impl Target for Free {
             out.lanes[lane as usize] = Contribution::settle([column, row], Rgb::splat(4.0 * x * x)).0;
         }
     }
-}
-
-/// Blocks of ladders of `rungs` replicas that have gone through some sweeps.
-struct Ladders {
-    footprint: Footprint,
-    film: Accumulator,
-    layers: Layers,
-    groups: PointGroups,
-    round: Round,
-    blocks: Vec<Block<Vec<u32>>>,
-}
-
-impl Ladders {
-    fn new(rungs: usize, blocks: usize) -> Ladders {
-        let ladder = Ladder::even(rungs);
-        // g^β has the normaliser 4^β/(2β + 1)
-        let ln_z: Vec<f64> = ladder.betas().iter().map(|beta| beta * 4f64.ln() - (2.0 * beta + 1.0).ln()).collect();
-        let layers = Layers::of(&Choices { combine: Combine::Balance, ..Choices::default() }, rungs, false);
-        let round = Round {
-            weights: Weights::new(&ladder, &ln_z, 1.0, 0.0),
-            mixes: std::array::from_fn(|_| vec![StepMix::about(STEPS); rungs]),
-            effort: [1.0; 2],
-            only_offers: true,
-            open: false,
-            half: u64::MAX,
-            ladder,
-        };
-        let ladders = ladders_a_block(rungs);
-        let mut all = Ladders {
-            footprint: Footprint::new(Filter::Box, FILM, FILM),
-            film: Accumulator::new(FILM, FILM, layers.count, 4.0),
-            layers,
-            groups: PointGroups::new(blocks),
-            blocks: (0..blocks)
-                .map(|i| Block::new(Rng::new(0), (i, ladders), rungs, 1, 512, layers.count, [FILM; 2]))
-                .collect(),
-            round,
-        };
-        let starts: Vec<Vec<Start>> = (1..rungs).map(|_| resample(&samples(), 1.0, ladders, Rng::new(0), 0)).collect();
-        let starts: Vec<&[Start]> = starts.iter().map(Vec::as_slice).collect();
-        all.blocks.iter_mut().for_each(|block| block.start(&Free, &starts));
-        all.work(|block, canvas, round| block.advance(&Free, 16, canvas, round));
-        all
-    }
-
-    /// Does something with every block in parallel, and empties their splats.
-    fn work(&mut self, work: impl Fn(&mut Block<Vec<u32>>, &Canvas, &Round) + Sync) {
-        let Ladders { footprint, film, layers, groups, round, blocks } = self;
-        let canvas = Canvas { footprint, size: [FILM; 2], film, unit: 4.0, layers: *layers, probes: None, groups };
-        blocks.par_iter_mut().for_each(|block| {
-            work(block, &canvas, round);
-            block.deposit(&canvas);
-        });
-    }
-}
-
-/// Uniform points of the target.
-fn samples() -> Vec<Start> {
-    let counter = |step| Counter { ladder: 0, replica: 0, step, purpose: Purpose::Bootstrap };
-    let ln_g = |counter| {
-        let x = unit_f32(Rng::new(0).words(counter, 0)[0]);
-        Contribution::settle([0.0; 2], Rgb::splat(4.0 * x * x)).0.ln_g
-    };
-    (0..256).map(|step| Start { counter: counter(step), ln_g: ln_g(counter(step)) }).collect()
 }
 
 fn all(criterion: &mut Criterion) {
@@ -133,14 +67,17 @@ fn all(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Ladders of so many rungs in a block.
-fn ladders_a_block(rungs: usize) -> usize {
-    (CHAINS / (rungs - 1)).max(1)
-}
-
 /// Mutations of a sweep of a block: every chain moves, and every ladder is offered a point.
 fn a_sweep(rungs: usize) -> u64 {
     (ladders_a_block(rungs) * rungs) as u64
+}
+
+/// Ladders on the target that costs nothing, whose normalisers are 4^β/(2β + 1).
+fn ladders(rungs: usize, blocks: usize) -> Ladders<Vec<u32>> {
+    let ladder = Ladder::even(rungs);
+    let ln_z: Vec<f64> = ladder.betas().iter().map(|beta| beta * 4f64.ln() - (2.0 * beta + 1.0).ln()).collect();
+    let film = Film { footprint: Footprint::new(Filter::Box, FILM, FILM), size: [FILM; 2], brightest: 4.0 };
+    Ladders::new(&Free, film, (ladder, &ln_z), &samples(&Free), (blocks, 1))
 }
 
 fn swap(group: &mut BenchmarkGroup<WallTime>, rungs: usize, threads: usize) {
@@ -149,7 +86,7 @@ fn swap(group: &mut BenchmarkGroup<WallTime>, rungs: usize, threads: usize) {
     group.bench_function(BenchmarkId::new(format!("swap/{threads}"), rungs), |bencher| {
         let (pool, ladders) = prepared.get_or_insert_with(|| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let ladders = pool.install(|| Ladders::new(rungs, BLOCKS));
+            let ladders = pool.install(|| ladders(rungs, BLOCKS));
             (pool, ladders)
         });
         bencher.iter(|| pool.install(|| ladders.work(|block, canvas, round| block.swap(canvas, round))));
@@ -160,14 +97,14 @@ fn replica_exchange(group: &mut BenchmarkGroup<WallTime>, rungs: usize) {
     let mut prepared = None;
     group.throughput(Throughput::Elements(a_sweep(rungs)));
     group.bench_function(BenchmarkId::new("re", rungs), |bencher| {
-        let ladders = prepared.get_or_insert_with(|| Ladders::new(rungs, 1));
+        let ladders = prepared.get_or_insert_with(|| ladders(rungs, 1));
         bencher.iter(|| ladders.work(|block, canvas, round| block.advance(&Free, 1, canvas, round)));
     });
 }
 
 fn baseline(group: &mut BenchmarkGroup<WallTime>) {
     let large_steps = LargeSteps { probability: LARGE_STEP_PROBABILITY, kelemen_weights: false };
-    let starts = resample(&samples(), 1.0, CHAINS, Rng::new(0), 0);
+    let starts = resample(&samples(&Free), 1.0, CHAINS, Rng::new(0), 0);
     let mut chains = Baseline::new(&Free, Rng::new(0), 0, &starts, large_steps);
     let (footprint, film) = (Footprint::new(Filter::Box, FILM, FILM), Accumulator::new(FILM, FILM, 1, 4.0));
     let mut splats = Splats::new(1);

@@ -7,14 +7,9 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
-use glam::{Mat3, Vec3};
 use relt::embree::{Hits, Rays, Width};
-use relt::math::{Frame, warp};
 use relt::path::MappingKind;
 use relt::render::calibration::record_rays;
-use relt::rng::{Counter, Purpose, Rng, unit_f32};
-use relt::scene::SceneDescription;
-use relt::scene::description::{ShapeDescription, ShapeGeometry, Sides};
 
 mod support;
 
@@ -24,7 +19,7 @@ const BATCHES: u64 = 16;
 
 fn tracing(criterion: &mut Criterion) {
     let plain = support::SCENES.map(|name| (name, support::describe(name)));
-    for (name, description) in plain.into_iter().chain([("quadrics", quadrics())]) {
+    for (name, description) in plain.into_iter().chain([("quadrics", support::quadrics())]) {
         let scene = support::build(description);
         let rays = record_rays(&scene, MappingKind::Unidirectional, BATCHES);
         let mut hits = Hits::default();
@@ -57,34 +52,6 @@ fn all_widths(criterion: &mut Criterion, name: &str, batches: &[Rays], mut trace
         });
     }
     group.finish();
-}
-
-/// The Cornell box with spheres and disks anywhere in it.
-fn quadrics() -> SceneDescription {
-    let mut description = support::describe("cornell-box");
-    let shape = |i: u64| {
-        let words = |block| {
-            let counter = Counter { ladder: 0, replica: 0, step: i, purpose: Purpose::Primary };
-            Rng::new(7).words(counter, block).map(unit_f32)
-        };
-        let ([x, y, z, r], [s, t, ..]) = (words(0), words(1));
-        let (center, radius) = (2.0 * Vec3::new(x, y, z) - 1.0, 0.02 + 0.3 * r);
-        let geometry = match i % 2 {
-            0 => ShapeGeometry::Sphere { center, radius, axes: Mat3::IDENTITY, flipped: false },
-            _ => {
-                let Frame { s, t, n } = Frame::new(warp::sphere([s, t]));
-                ShapeGeometry::Disk { center, radius, axes: Mat3::from_cols(s, t, n) }
-            }
-        };
-        ShapeDescription {
-            name: format!("quadric {i}"),
-            geometry,
-            sides: Sides::Two { front: 0, back: 0 },
-            emission: None,
-        }
-    };
-    description.shapes.extend((0..40).map(shape));
-    description
 }
 
 criterion_group!(benches, tracing);

@@ -6,7 +6,8 @@
 //!
 //! reads what criterion keeps in `target/criterion` (or in the folder that is given) and prints, as far as it was ever
 //! measured there: mutations a second of every method and ladder, and by packet width; nanoseconds a mutation of every
-//! stage; rays a second. Times are those that criterion prints: of a straight line through its samples, or their mean.
+//! stage; rays a second; and the tables of `benches/in_turn.rs`. Times are those that criterion prints: of a straight line
+//! through its samples, or their mean.
 //! Beside a number is its ratio to a baseline; ± is half of the 95 % confidence interval, for ratios as if both were
 //! measured independently. Intervals tell how samples scattered, not whether the machine was as fast for both.
 
@@ -25,14 +26,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let target = || env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     let folder = env::args_os().nth(1).map_or_else(|| target().join("criterion"), PathBuf::from);
     let benchmarks = read(&folder)?;
-    if benchmarks.is_empty() {
+    if benchmarks.is_empty() && measured_in_turn(&folder)?.is_empty() {
         return Err(
             format!("no benchmark in {}; run some first, such as: cargo bench -- ladders", folder.display()).into()
         );
     }
     let tables: Vec<String> = TABLES.iter().filter_map(|table| table.of(&benchmarks)).collect();
-    print!("{}", tables.join("\n"));
+    print!("{}", [tables, measured_in_turn(&folder)?].concat().join("\n"));
     Ok(())
+}
+
+/// The tables that `benches/in_turn.rs` has made, as they are.
+fn measured_in_turn(folder: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+    let folder = folder.join("in-turn");
+    let names = ["embree", "rungs", "threads", "kernels"].map(|name| folder.join(format!("{name}.md")));
+    let tables = names
+        .iter()
+        .filter(|path| path.is_file())
+        .map(|path| fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()).into()));
+    tables.collect()
 }
 
 /// A number with its confidence interval.
@@ -307,6 +319,16 @@ mod tests {
         let table = TABLES[0].of(&benchmarks).expect("something was measured");
         assert!(table.ends_with(expected), "{table}");
         assert!(TABLES[2].of(&benchmarks).is_none());
+    }
+
+    #[test]
+    fn tables_of_what_was_measured_in_turn_are_shown_as_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(measured_in_turn(folder.path()).unwrap().is_empty());
+        fs::create_dir(folder.path().join("in-turn")).unwrap();
+        fs::write(folder.path().join("in-turn/kernels.md"), "A table").unwrap();
+        assert_eq!(measured_in_turn(folder.path()).unwrap(), ["A table"]);
+        assert!(read(folder.path()).unwrap().is_empty());
     }
 
     #[test]

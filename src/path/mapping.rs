@@ -1,6 +1,9 @@
 //! The mappings and the choice among them.
 
-use std::sync::OnceLock;
+use std::{
+    mem,
+    sync::{Mutex, OnceLock, PoisonError},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -103,6 +106,8 @@ pub struct Mapping<'s> {
     walk: Walk,
     /// An evaluation to look out for, where somebody asked for one.
     watch: Option<Watch>,
+    /// The rays of all batches, where somebody asked for them.
+    record: Option<Mutex<RecordedRays>>,
 }
 
 /// Looks out for the evaluation that draws the words of a counter.
@@ -176,6 +181,7 @@ impl<'s> Mapping<'s> {
             evaluate_open: (kind == MappingKind::Multiplexed).then_some(open),
             walk,
             watch: None,
+            record: None,
         }
     }
 
@@ -239,18 +245,46 @@ impl<'s> Mapping<'s> {
     /// subpaths of each, at the cost of the bidirectional mapping.
     pub fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
         let evaluate = self.evaluate_open.expect("points of other mappings have one outcome");
-        evaluate(self, proposals, out, workspace);
+        self.evaluate_by(evaluate, proposals, out, workspace);
+    }
+
+    /// Evaluates the proposals of all lanes that do not rest.
+    pub fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
+        self.evaluate_by(self.evaluate, proposals, out, workspace);
+    }
+
+    fn evaluate_by(
+        &self,
+        evaluate: Evaluate,
+        proposals: &mut Proposals,
+        out: &mut Contributions,
+        workspace: &mut Workspace,
+    ) {
+        match &self.record {
+            None => evaluate(self, proposals, out, workspace),
+            Some(record) => {
+                let tracing = mem::replace(&mut workspace.tracing, Tracing::recording());
+                evaluate(self, proposals, out, workspace);
+                let rays = mem::replace(&mut workspace.tracing, tracing).take_recorded();
+                record.lock().unwrap_or_else(PoisonError::into_inner).append(rays);
+            }
+        }
         if let Some(watch) = &self.watch {
             watch.look(proposals);
         }
     }
 
-    /// Evaluates the proposals of all lanes that do not rest.
-    pub fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Workspace) {
-        (self.evaluate)(self, proposals, out, workspace);
-        if let Some(watch) = &self.watch {
-            watch.look(proposals);
-        }
+    /// Keeps a copy of the rays of every batch, whoever evaluates it.
+    pub fn recording(mut self) -> Self {
+        self.record = Some(Mutex::default());
+        self
+    }
+
+    /// The rays kept since the last call, batch by batch.
+    pub fn take_recorded(&self) -> RecordedRays {
+        self.record.as_ref().map_or_else(RecordedRays::default, |record| {
+            mem::take(&mut record.lock().unwrap_or_else(PoisonError::into_inner))
+        })
     }
 
     /// Looks out for the evaluation that draws the words of that counter.

@@ -51,6 +51,34 @@ pub struct RecordedRays {
     pub occluded: Vec<Vec<bool>>,
 }
 
+impl RecordedRays {
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        [&self.camera, &self.bounce, &self.shadow].into_iter().flatten().map(Rays::len).sum()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Adds those of further evaluations.
+    pub(super) fn append(&mut self, mut more: RecordedRays) {
+        self.camera.append(&mut more.camera);
+        self.bounce.append(&mut more.bounce);
+        self.shadow.append(&mut more.shadow);
+        self.hits.append(&mut more.hits);
+        self.occluded.append(&mut more.occluded);
+    }
+
+    /// Traces all of them once more and does nothing else.
+    pub fn trace(&self, scene: &Scene, widths: Widths, hits: &mut Hits, occluded: &mut Vec<bool>) {
+        self.camera.iter().for_each(|rays| scene.tracer.closest(widths.camera, rays, hits));
+        self.bounce.iter().for_each(|rays| scene.tracer.closest(widths.bounce, rays, hits));
+        self.shadow.iter().for_each(|rays| scene.tracer.occluded(widths.shadow, rays, occluded));
+    }
+}
+
 /// Recorded answers, given again in the order in which they were recorded, round and round.
 struct Replay {
     recorded: RecordedRays,

@@ -38,7 +38,11 @@ pub fn record_rays(scene: &Scene, kind: MappingKind, batches: u64) -> RecordedRa
 /// The fastest width for each kind of ray that a mapping of that scene has, from a few thousand rays. Hits do not depend on it, so
 /// neither does the image.
 pub fn calibrate(scene: &Scene, kind: MappingKind) -> Widths {
-    let rays = record_rays(scene, kind, BATCHES);
+    fastest_for(scene, &record_rays(scene, kind, BATCHES))
+}
+
+/// The fastest width for each kind of these rays.
+pub fn fastest_for(scene: &Scene, rays: &RecordedRays) -> Widths {
     let mut hits = Hits::default();
     let mut occluded = Vec::new();
     let mut closest = |batches: &[Rays]| {

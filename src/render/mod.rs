@@ -27,7 +27,7 @@ pub use checkpoint::{Checkpoint, CheckpointError, Resumed};
 pub use health::{Health, Verdict};
 pub use merge::{Merged, MergedPart, merge};
 pub use output::{Output, Picture};
-pub use run::{FLUSHED, Job, Outcome, RenderError, engine, restored, run, run_from, run_on};
+pub use run::{FLUSHED, Job, Outcome, RenderError, engine, restored, run, run_from, run_on, thread_pool};
 pub use settings::{
     Combine, LadderChoice, MappingChoice, Measure, Method, MltSettings, Normalisation, PacketChoice, Parts, Settings,
 };

@@ -249,8 +249,8 @@ struct Watch {
     last_round: Option<Arc<RoundReport>>,
 }
 
-/// Threads to work on.
-pub(super) fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
+/// Threads to work on, each on a core of its own if pinned.
+pub fn thread_pool(threads: usize, pin: bool) -> Result<rayon::ThreadPool, RenderError> {
     let mut builder = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("relt {i}"));
     if pin && let Some(cores) = core_affinity::get_core_ids().filter(|cores| !cores.is_empty()) {
         builder = builder.start_handler(move |i| {

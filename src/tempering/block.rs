@@ -13,7 +13,7 @@ use super::{
     trips::{IndexProcess, Trips},
 };
 use crate::{
-    chain::{Evaluator, Importance, Start, Target, Walkers, replay},
+    chain::{Evaluator, Importance, Start, Target, Walkers, draw_decisions, replay},
     path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
     sample::{Move, StepLaw},
@@ -62,6 +62,8 @@ struct Part<W> {
     /// Scale of each replica's step at work, and the random word that will decide on it.
     scale: Vec<u8>,
     decision: Vec<u32>,
+    /// All words that decide on a step, while one is prepared.
+    words: Vec<[u32; 4]>,
 }
 
 /// A [`Block`] as it is saved.
@@ -137,6 +139,7 @@ impl<W: Default + Send> Block<W> {
                 refused: vec![0; own],
                 scale: vec![0; own],
                 decision: vec![0; own],
+                words: Vec::new(),
                 lanes: range,
             });
         }
@@ -232,6 +235,7 @@ impl<W: Default + Send> Block<W> {
                     refused: Vec::new(),
                     scale: Vec::new(),
                     decision: Vec::new(),
+                    words: Vec::new(),
                 }),
             }
         }
@@ -310,6 +314,7 @@ impl<W: Default + Send> Block<W> {
     }
 
     /// Offers each fresh point to the lowest chain of its ladder, a swap that costs nothing.
+    #[inline(never)] // profiles tell what it takes
     fn inject(&mut self, canvas: &Canvas, round: &Round) {
         let replicas = self.rung.len();
         let lowest = round.ladder.betas()[1];
@@ -343,6 +348,7 @@ impl<W: Default + Send> Block<W> {
 
     /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones; a part of
     /// [`advance`](Self::advance).
+    #[inline(never)] // profiles tell what it takes
     pub fn swap(&mut self, canvas: &Canvas, round: &Round) {
         let rng = self.parts[0].evaluator.rng();
         let betas = round.ladder.betas();
@@ -477,10 +483,9 @@ impl<W: Default> Part<W> {
             self.change_techniques(target, canvas, round, rung);
         }
         self.evaluator.moves[self.replicas..].fill(Move::Fresh);
-        for at in 0..self.replicas {
+        draw_decisions(rng, &self.evaluator.counters[..self.replicas], &mut self.words);
+        for (at, &[decision, choice, ..]) in self.words.iter().enumerate() {
             let k = usize::from(rung[self.lanes.start + at]);
-            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
-            let [decision, choice, ..] = rng.words(counter, 0);
             self.decision[at] = decision;
             self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
             self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);

@@ -89,7 +89,8 @@ pub fn swap_acceptance(beta_hotter: f64, ln_g_hotter: f64, beta_colder: f64, ln_
     if ln_g_hotter == f64::NEG_INFINITY {
         return 0.0;
     }
-    libm::exp(((beta_colder - beta_hotter) * (ln_g_hotter - ln_g_colder)).min(0.0))
+    let ln_alpha = (beta_colder - beta_hotter) * (ln_g_hotter - ln_g_colder);
+    if ln_alpha < 0.0 { libm::exp(ln_alpha) } else { 1.0 }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
     throughput.py [--relt PROGRAM] [--scene FILE] [--rounds N] [--variants llvm_ad_rgb,scalar_rgb]
 
-Needs `pip install mitsuba` (3.9.1). The variant llvm_ad_rgb compiles for this processor with LLVM: versions 14 and 15 do
+Needs `pip install mitsuba numpy` (3.9.1 of the former). The variant llvm_ad_rgb compiles for this processor with LLVM: versions 14 and 15 do
 not know the newest ones and fail; point DRJIT_LIBLLVM_PATH at the library of version 16 or later. On Debian 12:
 
     apt-get download libllvm19 && dpkg -x libllvm19_*.deb llvm
