@@ -202,8 +202,12 @@ mpi() {
     say "        mpirun says: $(grep -m1 -i "signal 9" killed.log)"
     "${run[@]}" -n 3 "$RELT" render "$scene" "${job[@]}" --threads 1 "${CHECK[@]}" -o killed.exr >again.log 2>&1
     holds "a rank killed with kill -9, gone on with on 3 ranks: the same bits" eval 'equal killed.exr && went_on again.log'
-    "${run[@]}" -n 2 "$RELT" render "$scene" --method mlt -o mlt.exr >mlt.log 2>&1
-    holds "what cannot be shared is refused, and no rank waits for ever" eval '! [ -e mlt.exr ] && grep -q "runs on one rank only" mlt.log'
+    "$RELT" render "$scene" "${job[@]}" --method mlt -o alone.exr >alone.log 2>&1
+    "${run[@]}" -n 3 "$RELT" render "$scene" "${job[@]}" --method mlt --threads 1 -o mlt.exr >mlt.log 2>&1
+    holds "mlt on 3 ranks: the bits of one process" eval 'grep -q "on 3 ranks" mlt.log && equal mlt.exr'
+    cp ../whole.exr alone.exr
+    "${run[@]}" -n 3 "$RELT" render "$scene" "${job[@]}" --parts $parts --threads 1 -o parts.exr >parts.log 2>&1
+    holds "--parts $parts on 3 ranks: the bits of --parts $parts" eval 'grep -q "on 3 ranks" parts.log && equal parts.exr'
     cd "$scratch"
 }
 

@@ -169,22 +169,13 @@ impl<W: Default + Send> Sampler<W> {
         state.faults.merge(&added.faults);
     }
 
-    /// Adds up the film at the first rank; what the others have is then of no more use.
+    /// Adds up the film at the first rank.
     fn gather_film(&mut self, company: &Company) {
-        let screen = &self.screen;
-        let empty = || Accumulator::new(screen.size[0], screen.size[1], screen.prepared.count, screen.unit);
-        let add = |film: &mut &Accumulator, bytes: &[u8]| {
-            let mut other = empty();
-            other.restore(&mut source(bytes)).expect("what a rank of the same run told");
-            film.merge(&other);
-        };
-        company.fold(&mut &screen.film, |film| saved(|bytes| film.save(bytes)), add);
-        if !company.is_first() {
-            self.screen.film = empty();
-        }
+        let Screen { size, prepared, unit, film, .. } = &mut self.screen;
+        company.gather_film(film, || Accumulator::new(size[0], size[1], prepared.count, *unit));
     }
 
-    /// The same with the probes, where there are any.
+    /// Adds up the probes at the first rank, where there are any; the others keep theirs.
     fn gather_probes(&self, company: &Company) {
         let screen = &self.screen;
         let Some(probes) = &screen.probes else { return };
