@@ -113,6 +113,12 @@ impl Company {
         first(rank)..first(rank + 1).max(first(rank) + 1)
     }
 
+    /// This rank among those that have the same piece.
+    pub fn group(self: &Arc<Self>, piece: usize, pieces: usize) -> Group {
+        let ranks = self.ranks_at(piece, pieces);
+        Group { company: Some(self.clone()), number: self.number() - ranks.start, ranks }
+    }
+
     /// Everyone's value for everyone, by rank.
     pub fn everywhere<T: Serialize + DeserializeOwned>(&self, own: &T) -> Vec<T> {
         let own = to_bytes(own);
@@ -183,6 +189,71 @@ impl Company {
         self.bytes.fetch_add(bytes(&heard) as u64, Relaxed);
         self.messages.fetch_add(1, Relaxed);
         heard
+    }
+}
+
+/// Ranks that share a piece of work, or one alone.
+#[derive(Clone)]
+pub struct Group {
+    company: Option<Arc<Company>>,
+    ranks: Range<usize>,
+    /// Number of this rank among them.
+    number: usize,
+}
+
+impl Group {
+    /// This rank, which shares with nobody.
+    pub fn alone() -> Group {
+        Group { company: None, ranks: 0..1, number: 0 }
+    }
+
+    /// How many they are.
+    pub fn count(&self) -> usize {
+        self.ranks.len()
+    }
+
+    /// Whether there is nobody to share with.
+    pub fn is_alone(&self) -> bool {
+        self.count() == 1
+    }
+
+    /// Whether this is the first of them, which keeps what they have in common.
+    pub fn is_first(&self) -> bool {
+        self.number == 0
+    }
+
+    /// Of so many things those of this rank; ranks have theirs in the order of their numbers.
+    pub fn own(&self, things: usize) -> Range<usize> {
+        self.of(self.number, things)
+    }
+
+    /// The same of number `number` among them.
+    pub fn of(&self, number: usize, things: usize) -> Range<usize> {
+        let first = |number: usize| things * number / self.ranks.len();
+        first(number)..first(number + 1)
+    }
+
+    /// Everyone's value for everyone, in order: all tell the first one, and it tells all.
+    pub fn everywhere<T: Serialize + DeserializeOwned>(&self, own: &T) -> Vec<T> {
+        let own = to_bytes(own);
+        let talk = |ranks: &dyn Ranks| {
+            let first = self.ranks.start;
+            if !self.is_first() {
+                ranks.send(first, &own);
+                return from_bytes(&ranks.receive(first));
+            }
+            let others = || self.ranks.clone().skip(1);
+            let all: Vec<Vec<u8>> =
+                std::iter::once(own.clone()).chain(others().map(|rank| ranks.receive(rank))).collect();
+            let bytes = to_bytes(&all);
+            others().for_each(|rank| ranks.send(rank, &bytes));
+            all
+        };
+        let all: Vec<Vec<u8>> = match &self.company {
+            Some(company) => company.timed(talk, |all| all.iter().map(Vec::len).sum::<usize>() - own.len()),
+            None => vec![own],
+        };
+        all.iter().map(|bytes| from_bytes(bytes)).collect()
     }
 }
 
