@@ -25,6 +25,11 @@
 //!
 //! All keys of `[[method]]` but `name`, and those of `[options]`, are options of `relt render` without their dashes, as
 //! TOML numbers, strings or, for flags, `true`. So a study can vary whatever a run can.
+//!
+//! Two more keys are about how a run is done. `ranks = [1, 2, 4]`: on so many ranks, by the study's launcher, at the head of the
+//! file `launch = "mpirun -n {ranks}"` (which is the default), in front of a `relt render` that must be built with the
+//! feature `mpi`. `per-worker = true`: the budget in mutations is that of each worker, threads times ranks (weak scaling),
+//! and not of all together (strong scaling).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -103,6 +108,12 @@ pub struct StudyMethod {
     pub name: String,
     /// Words of a command line: `--method`, `re`, …
     pub options: Vec<String>,
+    /// What starts `relt render` on several ranks, word by word; nothing where the study's own process renders.
+    pub launch: Vec<String>,
+    /// Ranks that it starts.
+    pub ranks: Option<u32>,
+    /// Each worker has the study's budget in mutations, not all of them together.
+    pub per_worker: bool,
     /// What was varied: values by option.
     pub variant: Vec<(String, String)>,
     /// What the options say; seed and budget are the run's.
@@ -139,6 +150,7 @@ struct Document {
     #[serde(default)]
     exclude: Vec<Stage>,
     baseline: Option<Spanned<String>>,
+    launch: Option<String>,
     #[serde(default)]
     options: Table,
     #[serde(default, rename = "scene")]
@@ -184,7 +196,7 @@ const SNAPSHOTS: usize = 12;
 /// Errors are first taken after this part of the budget where the study does not say.
 const FIRST_SNAPSHOT: f64 = 1.0 / 64.0;
 /// Options that the study itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 15] = [
+const NOT_OPTIONS: [&str; 14] = [
     "seed",
     "mpp",
     "time",
@@ -196,11 +208,17 @@ const NOT_OPTIONS: [&str; 15] = [
     "confine",
     "resume",
     "part",
-    "parts",
     "quiet",
     "verbose",
     "layers",
 ];
+/// Options of a method that say how a run is done and are none of `relt render`.
+const HOW: [&str; 2] = ["ranks", "per-worker"];
+/// What starts several ranks, where the study does not say.
+const LAUNCH: &str = "mpirun -n {ranks}";
+/// Most ranks of a run.
+const MOST_RANKS: u32 = 1 << 20;
+
 /// Reads a study file; `parse` knows the options of methods.
 pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
     let text = std::fs::read_to_string(path).map_err(|error| FileError::read(path, error))?;
@@ -208,7 +226,8 @@ pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
         let place = place(path, &text, error.span().unwrap_or_default());
         StudyError::Content(vec![format!("{place}: {}", error.message().replace('\n', ", "))])
     })?;
-    let mut reader = Reader { path, text: &text, faults: Vec::new() };
+    let launch = document.launch.clone().unwrap_or_else(|| LAUNCH.into());
+    let mut reader = Reader { path, text: &text, launch, faults: Vec::new() };
     let study = reader.study(document, parse);
     match (study, reader.faults) {
         (Some(study), faults) if faults.is_empty() => Ok(study),
@@ -220,6 +239,7 @@ pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
 struct Reader<'a> {
     path: &'a Path,
     text: &'a str,
+    launch: String,
     faults: Vec<String>,
 }
 
@@ -444,7 +464,21 @@ impl Reader<'_> {
         options: &[Choice],
         parse: &ParseOptions,
     ) -> Option<StudyMethod> {
-        let words: Vec<String> = options.iter().flat_map(Choice::words).collect();
+        let of_run = options.iter().filter(|option| !HOW.contains(&option.name.as_str()));
+        let words: Vec<String> = of_run.flat_map(Choice::words).collect();
+        let how = HOW.map(|name| options.iter().find(|option| option.name == name).map(|option| &option.value));
+        let ranks = match how[0] {
+            None => None,
+            Some(Value::Integer(n)) if (1..=i64::from(MOST_RANKS)).contains(n) => Some(*n as u32),
+            Some(other) => {
+                self.fault(span.clone(), format!("`ranks` is {other}; accepted are 1 to {MOST_RANKS}"));
+                None
+            }
+        };
+        let per_worker = how[1].is_some_and(|value| value.as_bool() == Some(true));
+        let launch = ranks.map_or(Vec::new(), |ranks| {
+            self.launch.split_whitespace().map(|word| word.replace("{ranks}", &ranks.to_string())).collect()
+        });
         let variant: Vec<(String, String)> = options
             .iter()
             .filter(|option| option.varied)
@@ -453,7 +487,12 @@ impl Reader<'_> {
         let chosen = options.iter().find(|option| option.name == "method").and_then(|option| word(&option.value));
         let name = full_name(name, chosen.as_deref().unwrap_or("re"), options, &variant);
         match parse(&words) {
-            Ok(settings) => Some(StudyMethod { name, options: words, variant, settings }),
+            Ok(settings) if per_worker && settings.threads.is_none() => {
+                let what = "`per-worker` wants `threads`, without which nobody knows how many workers there are";
+                self.fault(span, format!("method `{name}`: {what}"));
+                None
+            }
+            Ok(settings) => Some(StudyMethod { name, options: words, launch, ranks, per_worker, variant, settings }),
             Err(what) => {
                 let lines = what.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ");
                 self.fault(span, format!("method `{name}`: {lines}"));
@@ -473,6 +512,23 @@ fn full_name(name: Option<&str>, method: &str, options: &[Choice], variant: &[(S
     let unmentioned = variant.iter().filter(|(option, _)| !template.contains(&format!("{{{option}}}")));
     let unmentioned = unmentioned.filter(|(option, value)| !(option == "method" && value == template));
     unmentioned.fold(full, |full, (option, value)| format!("{full}, {option} {value}"))
+}
+
+impl StudyMethod {
+    /// Options as results have them: those of `relt render` and how it is run.
+    pub fn all_options(&self) -> Vec<String> {
+        let ranks = self.ranks.iter().flat_map(|ranks| ["--ranks".to_owned(), ranks.to_string()]);
+        let per_worker = self.per_worker.then(|| "--per-worker".to_owned());
+        self.options.iter().cloned().chain(ranks).chain(per_worker).collect()
+    }
+
+    /// By how much the study's budget in mutations is multiplied.
+    pub fn budgets(&self) -> f64 {
+        match self.per_worker {
+            true => (self.settings.threads.unwrap_or(1) as u64 * u64::from(self.ranks.unwrap_or(1))) as f64,
+            false => 1.0,
+        }
+    }
 }
 
 impl StudyScene {
