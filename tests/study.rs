@@ -295,12 +295,14 @@ fn a_folder_is_one_studys_at_a_time() {
 fn runs_by_a_launcher_come_to_the_same_and_scale() {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
-        "title = \"Ranks\"\nmpp = 24\nseeds = 1\nlaunch = \"env RANKS={{ranks}}\"\n[[scene]]\nfile = \"{BOX}\"\n\
+        "title = \"Ranks\"\nmpp = 24\nseeds = 1\n[[scene]]\nfile = \"{BOX}\"\n\
          define = {{ res = 32 }}\n[options]\nthreads = 1\nmethod = \"path\"\n[[method]]\nname = \"here\"\n[[method]]\n\
          name = \"on {{ranks}}\"\nranks = [1, 2]\nper-worker = true\n"
     );
     write_study(folder.path(), &text);
-    done(relt(folder.path(), &["small.toml"]).output().unwrap());
+    let refused = relt(folder.path(), &["small.toml"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("method `on 1` is for 1 ranks: give --launch"));
+    done(relt(folder.path(), &["small.toml", "--launch", "env RANKS={ranks}"]).output().unwrap());
     let result = folder.path().join("small");
     let records = records(&result);
     let run = |method: &str| {

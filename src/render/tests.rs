@@ -194,7 +194,7 @@ fn ranks_come_to_the_bits_of_one_process_by_mlt_and_in_parts() {
     };
     let mlt = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
     for (method, of) in [(Method::Mlt, 2), (Method::ReplicaExchange, 2)] {
-        let settings = Settings { method, mlt: mlt.clone(), parts: Parts { of, only: None }, ..Settings::default() };
+        let settings = Settings { method, mlt, parts: Parts { of, only: None }, ..Settings::default() };
         let make = || engine(&stage, &settings, Some(MUTATIONS));
         let alone = go(make().as_mut());
         for count in [2, 11] {

@@ -26,10 +26,10 @@
 //! All keys of `[[method]]` but `name`, and those of `[options]`, are options of `relt render` without their dashes, as
 //! TOML numbers, strings or, for flags, `true`. So a study can vary whatever a run can.
 //!
-//! Two more keys are about how a run is done. `ranks = [1, 2, 4]`: on so many ranks, by the study's launcher, at the head of the
-//! file `launch = "mpirun -n {ranks}"` (which is the default), in front of a `relt render` that must be built with the
-//! feature `mpi`. `per-worker = true`: the budget in mutations is that of each worker, threads times ranks (weak scaling),
-//! and not of all together (strong scaling).
+//! Two more keys are about how a run is done. `ranks = [1, 2, 4]`: on so many ranks, by the launcher that the person at the
+//! keyboard names (`relt study --launch "mpirun -n {ranks}"`; a file starts no programs), in front of a `relt render` that must
+//! be built with the feature `mpi`; their processor time is not known, only wall time. `per-worker = true`: the budget in mutations is that of each worker, threads times ranks
+//! (weak scaling), and not of all together (strong scaling).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -108,7 +108,8 @@ pub struct StudyMethod {
     pub name: String,
     /// Words of a command line: `--method`, `re`, …
     pub options: Vec<String>,
-    /// What starts `relt render` on several ranks, word by word; nothing where the study's own process renders.
+    /// What starts `relt render` on several ranks, word by word; nothing where the study's own process renders, and until it is
+    /// [named](Study::launch_by).
     pub launch: Vec<String>,
     /// Ranks that it starts.
     pub ranks: Option<u32>,
@@ -150,7 +151,6 @@ struct Document {
     #[serde(default)]
     exclude: Vec<Stage>,
     baseline: Option<Spanned<String>>,
-    launch: Option<String>,
     #[serde(default)]
     options: Table,
     #[serde(default, rename = "scene")]
@@ -214,8 +214,6 @@ const NOT_OPTIONS: [&str; 14] = [
 ];
 /// Options of a method that say how a run is done and are none of `relt render`.
 const HOW: [&str; 2] = ["ranks", "per-worker"];
-/// What starts several ranks, where the study does not say.
-const LAUNCH: &str = "mpirun -n {ranks}";
 /// Most ranks of a run.
 const MOST_RANKS: u32 = 1 << 20;
 
@@ -226,8 +224,7 @@ pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
         let place = place(path, &text, error.span().unwrap_or_default());
         StudyError::Content(vec![format!("{place}: {}", error.message().replace('\n', ", "))])
     })?;
-    let launch = document.launch.clone().unwrap_or_else(|| LAUNCH.into());
-    let mut reader = Reader { path, text: &text, launch, faults: Vec::new() };
+    let mut reader = Reader { path, text: &text, faults: Vec::new() };
     let study = reader.study(document, parse);
     match (study, reader.faults) {
         (Some(study), faults) if faults.is_empty() => Ok(study),
@@ -239,7 +236,6 @@ pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
 struct Reader<'a> {
     path: &'a Path,
     text: &'a str,
-    launch: String,
     faults: Vec<String>,
 }
 
@@ -476,9 +472,6 @@ impl Reader<'_> {
             }
         };
         let per_worker = how[1].is_some_and(|value| value.as_bool() == Some(true));
-        let launch = ranks.map_or(Vec::new(), |ranks| {
-            self.launch.split_whitespace().map(|word| word.replace("{ranks}", &ranks.to_string())).collect()
-        });
         let variant: Vec<(String, String)> = options
             .iter()
             .filter(|option| option.varied)
@@ -492,7 +485,10 @@ impl Reader<'_> {
                 self.fault(span, format!("method `{name}`: {what}"));
                 None
             }
-            Ok(settings) => Some(StudyMethod { name, options: words, launch, ranks, per_worker, variant, settings }),
+            Ok(settings) => {
+                let launch = Vec::new();
+                Some(StudyMethod { name, options: words, launch, ranks, per_worker, variant, settings })
+            }
             Err(what) => {
                 let lines = what.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ");
                 self.fault(span, format!("method `{name}`: {lines}"));
@@ -539,6 +535,22 @@ impl StudyScene {
 }
 
 impl Study {
+    /// Names what starts methods on ranks, with `{ranks}` where their number belongs; a fault where that is missing.
+    pub fn launch_by(&mut self, launcher: Option<&str>) -> Result<(), String> {
+        for method in &mut self.methods {
+            let Some(ranks) = method.ranks else { continue };
+            let words = launcher.unwrap_or_default().split_whitespace();
+            method.launch = words.map(|word| word.replace("{ranks}", &ranks.to_string())).collect();
+            if method.launch.is_empty() {
+                return Err(format!(
+                    "method `{}` is for {ranks} ranks: give --launch, such as --launch \"mpirun -n {{ranks}}\"",
+                    method.name
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// What each run is given, in words.
     pub fn budget_in_words(&self) -> String {
         match self.budget {

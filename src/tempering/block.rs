@@ -225,7 +225,7 @@ impl<W: Default + Send> Block<W> {
         self.cut_anew(saved);
     }
 
-    /// Changes the number of points offered to a ladder each sweep.
+    /// Changes the number of points offered to a ladder each sweep; when all splats are deposited.
     pub fn set_offers(&mut self, offers: usize) {
         if offers != self.offers {
             self.offers = offers;
