@@ -7,6 +7,7 @@
 #[cfg(feature = "mpi")]
 mod mpi;
 
+use std::ops::Range;
 use std::sync::{
     Arc,
     atomic::{AtomicU64, Ordering::Relaxed},
@@ -14,6 +15,8 @@ use std::sync::{
 use std::time::{Duration, Instant};
 
 use serde::{Serialize, de::DeserializeOwned};
+
+use crate::{film::Accumulator, saved::Source};
 
 /// A way for ranks to reach one another. All ranks make the same calls in the same order.
 pub trait Ranks: Send + Sync {
@@ -93,6 +96,29 @@ impl Company {
         self.number() == 0
     }
 
+    /// Of so many pieces of work those of this rank: some each, or one that several ranks have where these are more.
+    pub fn own(&self, pieces: usize) -> Range<usize> {
+        self.pieces_of(self.number(), pieces)
+    }
+
+    /// The ranks that have a piece; all ranks of a piece that several have have no other.
+    pub fn ranks_at(&self, piece: usize, pieces: usize) -> Range<usize> {
+        let has_it = |rank: &usize| self.pieces_of(*rank, pieces).contains(&piece);
+        let first = (0..self.count()).find(has_it).expect("every piece is somebody's");
+        first..(first..self.count()).take_while(has_it).last().map_or(first, |last| last + 1)
+    }
+
+    fn pieces_of(&self, rank: usize, pieces: usize) -> Range<usize> {
+        let first = |rank: usize| pieces * rank / self.count();
+        first(rank)..first(rank + 1).max(first(rank) + 1)
+    }
+
+    /// This rank among those that have the same piece.
+    pub fn group(self: &Arc<Self>, piece: usize, pieces: usize) -> Group {
+        let ranks = self.ranks_at(piece, pieces);
+        Group { company: Some(self.clone()), number: self.number() - ranks.start, ranks }
+    }
+
     /// Everyone's value for everyone, by rank.
     pub fn everywhere<T: Serialize + DeserializeOwned>(&self, own: &T) -> Vec<T> {
         let own = to_bytes(own);
@@ -129,6 +155,24 @@ impl Company {
         }
     }
 
+    /// Adds up films at the first rank; the others begin with an `empty` one again.
+    pub fn gather_film(&self, film: &mut Accumulator, empty: impl Fn() -> Accumulator) {
+        let save = |film: &&mut Accumulator| {
+            let mut bytes = Vec::new();
+            film.save(&mut bytes).expect("memory takes all");
+            bytes
+        };
+        let add = |film: &mut &mut Accumulator, bytes: &[u8]| {
+            let mut other = empty();
+            other.restore(&mut Source::new(bytes, bytes.len() as u64)).expect("what a rank of the same run told");
+            film.merge(&other);
+        };
+        self.fold(&mut &mut *film, save, add);
+        if !self.is_first() {
+            *film = empty();
+        }
+    }
+
     /// What talking has taken so far.
     pub fn talk(&self) -> Talk {
         Talk {
@@ -145,6 +189,71 @@ impl Company {
         self.bytes.fetch_add(bytes(&heard) as u64, Relaxed);
         self.messages.fetch_add(1, Relaxed);
         heard
+    }
+}
+
+/// Ranks that share a piece of work, or one alone.
+#[derive(Clone)]
+pub struct Group {
+    company: Option<Arc<Company>>,
+    ranks: Range<usize>,
+    /// Number of this rank among them.
+    number: usize,
+}
+
+impl Group {
+    /// This rank, which shares with nobody.
+    pub fn alone() -> Group {
+        Group { company: None, ranks: 0..1, number: 0 }
+    }
+
+    /// How many they are.
+    pub fn count(&self) -> usize {
+        self.ranks.len()
+    }
+
+    /// Whether there is nobody to share with.
+    pub fn is_alone(&self) -> bool {
+        self.count() == 1
+    }
+
+    /// Whether this is the first of them, which keeps what they have in common.
+    pub fn is_first(&self) -> bool {
+        self.number == 0
+    }
+
+    /// Of so many things those of this rank; ranks have theirs in the order of their numbers.
+    pub fn own(&self, things: usize) -> Range<usize> {
+        self.of(self.number, things)
+    }
+
+    /// The same of number `number` among them.
+    pub fn of(&self, number: usize, things: usize) -> Range<usize> {
+        let first = |number: usize| things * number / self.ranks.len();
+        first(number)..first(number + 1)
+    }
+
+    /// Everyone's value for everyone, in order: all tell the first one, and it tells all.
+    pub fn everywhere<T: Serialize + DeserializeOwned>(&self, own: &T) -> Vec<T> {
+        let own = to_bytes(own);
+        let talk = |ranks: &dyn Ranks| {
+            let first = self.ranks.start;
+            if !self.is_first() {
+                ranks.send(first, &own);
+                return from_bytes(&ranks.receive(first));
+            }
+            let others = || self.ranks.clone().skip(1);
+            let all: Vec<Vec<u8>> =
+                std::iter::once(own.clone()).chain(others().map(|rank| ranks.receive(rank))).collect();
+            let bytes = to_bytes(&all);
+            others().for_each(|rank| ranks.send(rank, &bytes));
+            all
+        };
+        let all: Vec<Vec<u8>> = match &self.company {
+            Some(company) => company.timed(talk, |all| all.iter().map(Vec::len).sum::<usize>() - own.len()),
+            None => vec![own],
+        };
+        all.iter().map(|bytes| from_bytes(bytes)).collect()
     }
 }
 
@@ -244,6 +353,25 @@ mod tests {
                 sum
             });
             assert_eq!(sums[0], (1 << count) - 1, "{count} ranks");
+        }
+    }
+
+    #[test]
+    fn pieces_of_work_are_all_somebodys() {
+        for count in 1..=20 {
+            let own = together(count, |company| {
+                let ranks = (0..8).map(|piece| company.ranks_at(piece, 8));
+                (company.own(8), ranks.collect::<Vec<_>>())
+            });
+            for piece in 0..8 {
+                let has_it = |rank: &usize| own[*rank].0.contains(&piece);
+                let ranks: Vec<usize> = (0..count).filter(has_it).collect();
+                assert!(
+                    own.iter().all(|(_, told)| told[piece].clone().eq(ranks.iter().copied())),
+                    "{count} ranks: {own:?}"
+                );
+                assert!(!ranks.is_empty() && ranks.len() <= count.div_ceil(8), "{count} ranks: {own:?}");
+            }
         }
     }
 

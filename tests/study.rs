@@ -288,3 +288,33 @@ fn a_folder_is_one_studys_at_a_time() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("another relt is at work in it"));
 }
+
+/// A launcher that starts one process whatever it is told: with one rank the run is that of the study's own process; with two,
+/// the budget of each worker is there twice.
+#[test]
+fn runs_by_a_launcher_come_to_the_same_and_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "title = \"Ranks\"\nmpp = 24\nseeds = 1\n[[scene]]\nfile = \"{BOX}\"\n\
+         define = {{ res = 32 }}\n[options]\nthreads = 1\nmethod = \"path\"\n[[method]]\nname = \"here\"\n[[method]]\n\
+         name = \"on {{ranks}}\"\nranks = [1, 2]\nper-worker = true\n"
+    );
+    write_study(folder.path(), &text);
+    let refused = relt(folder.path(), &["small.toml"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("method `on 1` is for 1 ranks: give --launch"));
+    done(relt(folder.path(), &["small.toml", "--launch", "env RANKS={ranks}"]).output().unwrap());
+    let result = folder.path().join("small");
+    let records = records(&result);
+    let run = |method: &str| {
+        let lines = records.values().find(|lines| lines[0]["method"] == method).expect(method);
+        let end = *events(lines, "errors").last().unwrap();
+        (lines[0]["command"].as_str().unwrap().to_owned(), end["mutations"].as_f64().unwrap(), end["errors"].clone())
+    };
+    let [here, one, two] = ["here", "on 1", "on 2"].map(run);
+    assert_eq!((here.1, &here.2), (one.1, &one.2));
+    assert!((two.1 / one.1 - 2.0).abs() < 0.1, "{} and {}", one.1, two.1);
+    assert!(two.0.starts_with("env RANKS=2 relt render ") && two.0.ends_with("--mpp 48"), "{}", two.0);
+    let page = std::fs::read_to_string(result.join("report.html")).unwrap();
+    assert!(page.contains("by ranks: --method path --threads 1 --per-worker"), "two runs that differ in ranks");
+    assert_eq!(std::fs::read_dir(result.join("runs")).unwrap().count(), 3, "logs are in the records");
+}

@@ -177,6 +177,11 @@ impl<W: Default> Baseline<W> {
         }
     }
 
+    /// Counts steps that these chains make somewhere else.
+    pub fn advance_elsewhere(&mut self, steps: u64) {
+        self.steps += steps;
+    }
+
     fn step<T: Target<Workspace = W>>(&mut self, target: &T, unit: f64, recorder: &mut Recorder) {
         let rng = self.evaluator.rng();
         self.evaluator.counters.iter_mut().for_each(|counter| counter.step = self.steps);

@@ -1,5 +1,7 @@
 //! States of many chains.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::acceptance;
@@ -38,6 +40,32 @@ impl Walkers {
     pub fn fits(&self, lanes: usize) -> bool {
         let of = [self.points.lanes(), self.states.len(), self.pending.len()];
         of == [lanes; 3] && self.elsewhere.fits(lanes) && self.states.iter().all(|state| !state.ln_g.is_nan())
+    }
+
+    /// Some of the chains, as a batch of their own.
+    pub fn some(&self, lanes: Range<usize>) -> Walkers {
+        let mut some = Walkers::new(lanes.len());
+        for (to, from) in lanes.enumerate() {
+            some.copy(to, self, from);
+        }
+        some
+    }
+
+    /// All chains of several batches as one.
+    pub fn joined<'a>(batches: impl Iterator<Item = &'a Walkers> + Clone) -> Walkers {
+        let mut all = Walkers::new(batches.clone().map(|batch| batch.states.len()).sum());
+        let lanes = batches.flat_map(|batch| (0..batch.states.len()).map(move |lane| (batch, lane)));
+        for (to, (batch, from)) in lanes.enumerate() {
+            all.copy(to, batch, from);
+        }
+        all
+    }
+
+    fn copy(&mut self, to: usize, other: &Walkers, from: usize) {
+        self.points.copy(to, &other.points, from);
+        self.states[to] = other.states[from];
+        self.elsewhere.copy(to, &other.elsewhere, from);
+        self.pending[to] = other.pending[from];
     }
 
     /// All that a chain's state contributes.

@@ -18,7 +18,7 @@ use crate::render::memory::{self, FilmMemory};
 use crate::render::progress::{Progress, Teller, Verbosity};
 use crate::render::{
     self, Checkpoint, Health, Job, Observer, Outcome, Output, PacketChoice, Parts, Picture, Resumed, RunStart,
-    Settings, Status, Summary, Verdict, allocation, checkpoint, replay, shared,
+    Settings, Status, Summary, Verdict, allocation, checkpoint, replay,
 };
 use crate::scene::description::FilmDescription;
 use crate::tempering::RoundReport;
@@ -335,10 +335,6 @@ impl Render {
         let keep = self.keep();
         let (resumed, told) = self.resumed(keep.as_deref())?;
         let settings = self.settings(resumed.as_ref().map(|resumed| &resumed.header.start.settings))?;
-        let faults = if company.is_some() { shared::faults(&settings) } else { Vec::new() };
-        if !faults.is_empty() {
-            return Err(Failure::Input(faults));
-        }
         let is_part = settings.parts.only.is_some();
         // a part has nothing to show but what it keeps
         let keep = keep.or_else(|| resumed.as_ref().filter(|_| is_part).map(|resumed| resumed.path.clone()));

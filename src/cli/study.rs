@@ -37,6 +37,10 @@ pub(super) struct StudyArguments {
     #[arg(long)]
     confine: bool,
 
+    /// Starts runs of methods with `ranks`, such as "mpirun -n {ranks}"; a relt with the feature mpi follows
+    #[arg(long, value_name = "COMMAND")]
+    launch: Option<String>,
+
     /// Lists the runs with the time they should take, and does none
     #[arg(long)]
     dry_run: bool,
@@ -52,6 +56,7 @@ pub(super) fn run(arguments: StudyArguments) -> Result<(), Failure> {
         file::StudyError::Content(faults) => Failure::Input(faults),
         file::StudyError::File(error) => Failure::input(error),
     })?;
+    study.launch_by(arguments.launch.as_deref()).map_err(Failure::input)?;
     study.reach = Reach::confined(arguments.confine);
     let prepared = prepare(&study).map_err(Failure::Input)?;
     let jobs = jobs(&study, &prepared);

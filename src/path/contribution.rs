@@ -156,6 +156,11 @@ impl Outcome {
 ///
 /// Memory is as large as the longest list asks for and then stays, so a batch that is warm allocates nothing.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(
+    from = "Vec<Vec<T>>",
+    into = "Vec<Vec<T>>",
+    bound(serialize = "T: Copy + Default + Serialize", deserialize = "T: Copy + Default + Deserialize<'de>")
+)]
 pub struct Lists<T> {
     /// Items that a lane has room for.
     room: usize,
@@ -166,10 +171,9 @@ pub struct Lists<T> {
 }
 
 impl<T: Copy + Default> Lists<T> {
-    /// Whether it is for so many lanes and its lists lie where they should.
+    /// Whether it is for so many lanes.
     pub fn fits(&self, lanes: usize) -> bool {
-        let within = self.counts.iter().all(|count| usize::from(*count) <= self.room);
-        self.counts.len() == lanes && within && self.room.checked_mul(lanes) == Some(self.items.len())
+        self.counts.len() == lanes
     }
 
     /// Nothing, for `lanes` lanes.
@@ -231,6 +235,23 @@ impl<T: Copy + Default> Lists<T> {
             items[lane * room..lane * room + own.len()].copy_from_slice(own);
         }
         (self.room, self.items) = (room, items);
+    }
+}
+
+/// Lists are saved lane by lane, without the room around them.
+impl<T: Copy + Default> From<Lists<T>> for Vec<Vec<T>> {
+    fn from(lists: Lists<T>) -> Vec<Vec<T>> {
+        (0..lists.counts.len()).map(|lane| lists.of(lane).to_vec()).collect()
+    }
+}
+
+impl<T: Copy + Default> From<Vec<Vec<T>>> for Lists<T> {
+    fn from(saved: Vec<Vec<T>>) -> Lists<T> {
+        let mut lists = Lists::new(saved.len());
+        for (lane, items) in saved.into_iter().enumerate() {
+            items.into_iter().take(usize::from(u16::MAX)).for_each(|item| lists.push(lane, item));
+        }
+        lists
     }
 }
 

@@ -3,6 +3,8 @@
 //! with the image.
 
 use std::io::{self, Write};
+use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,6 +18,7 @@ use crate::{
     chain::{Baseline, Evaluator, LargeSteps, Plan, SavedBaseline, Start, baseline_layer, resample},
     film::{Accumulator, Footprint, Plane, Splats},
     path::{Faults, Workspace},
+    ranks::Company,
     rng::{Counter, Purpose, Rng},
     sample::{Move, Points},
     saved::{Source, Unfit, expect, write_value},
@@ -31,6 +34,7 @@ const BOOTSTRAP_BATCHES: u64 = 16;
 
 /// The method at work.
 pub struct Mlt {
+    rng: Rng,
     sheet: Sheet,
     footprint: Footprint,
     plan: Plan,
@@ -45,6 +49,8 @@ pub struct Mlt {
     bootstrap_faults: Faults,
     /// c from the first pass alone, also the magnitude that states are kept in on the film.
     first_estimate: Estimate,
+    /// The other ranks, where the work is shared.
+    company: Option<Arc<Company>>,
 }
 
 struct Block {
@@ -75,6 +81,7 @@ impl Mlt {
             })
             .collect();
         Mlt {
+            rng,
             sheet,
             footprint: sheet.footprint(),
             plan,
@@ -87,6 +94,7 @@ impl Mlt {
             bootstrap_faults,
             first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
+            company: None,
         }
     }
 
@@ -103,16 +111,12 @@ impl Mlt {
         expect(Accumulator::fewest_bytes(sheet.pixels(), large_steps.layers() as u64) <= from.left(), "film")?;
         let SavedMlt { bootstrap, bootstrap_rays, bootstrap_faults, blocks } = from.value()?;
         expect(blocks == 0 || blocks == plan.blocks, "chains")?;
-        let block = |i: usize| {
-            let saved: SavedBaseline = from.value()?;
-            let first = (i * plan.lanes()) as u32;
-            let chains = Baseline::restored(rng, first, plan.lanes(), saved, large_steps)?;
-            Ok(Block { chains, splats: Splats::new(large_steps.layers()) })
-        };
+        let block = |i: usize| Block::restored(rng, &plan, i, from.value()?, large_steps);
         let blocks = (0..blocks).map(block).collect::<Result<Vec<_>, Unfit>>()?;
         let mut film = sheet.accumulator(large_steps.layers());
         film.restore(from)?;
         Ok(Mlt {
+            rng,
             sheet: *sheet,
             footprint: sheet.footprint(),
             plan,
@@ -125,7 +129,19 @@ impl Mlt {
             bootstrap_faults,
             first_estimate: Estimate::from_sums(&bootstrap),
             bootstrap,
+            company: None,
         })
+    }
+
+    /// The blocks that are worked on here: all, unless the work is shared. A block is one rank's only.
+    fn own(&self) -> Range<usize> {
+        let blocks = self.blocks.len();
+        let Some(company) = self.company.as_ref().filter(|_| blocks > 0) else { return 0..blocks };
+        let own = company.own(blocks);
+        match company.ranks_at(own.start, blocks).start == company.number() {
+            true => own,
+            false => own.start..own.start,
+        }
     }
 
     /// The magnitude that states are kept in on the film: c as it is known before any step.
@@ -165,6 +181,21 @@ impl Mlt {
             *group = (group.0 + batch.0, group.1 + batch.1);
         }
         Estimate::from_sums(&groups)
+    }
+}
+
+impl Block {
+    /// Block number `number` of that plan as it was saved.
+    fn restored(
+        rng: Rng,
+        plan: &Plan,
+        number: usize,
+        saved: SavedBaseline,
+        large_steps: LargeSteps,
+    ) -> Result<Block, Unfit> {
+        let first = (number * plan.lanes()) as u32;
+        let chains = Baseline::restored(rng, first, plan.lanes(), saved, large_steps)?;
+        Ok(Block { chains, splats: Splats::new(large_steps.layers()) })
     }
 }
 
@@ -239,8 +270,11 @@ impl Engine for Mlt {
         let done = self.bootstrap_samples + self.blocks.first().map_or(0, |b| b.chains.steps()) * self.plan.a_sweep();
         let short = until.map_or(u64::MAX, |until| until.saturating_sub(done).div_ceil(self.plan.a_sweep()));
         let sweeps = sweeps.min(self.sweeps_left().unwrap_or(u64::MAX)).min(short);
-        let (film, unit) = (&self.film, self.unit());
-        self.blocks.par_iter_mut().for_each(|block| {
+        let (film, unit, own) = (&self.film, self.unit(), self.own());
+        self.blocks.par_iter_mut().enumerate().for_each(|(i, block)| {
+            if !own.contains(&i) {
+                return block.chains.advance_elsewhere(sweeps);
+            }
             block.chains.advance(&stage.mapping, sweeps, unit, &mut stage.recorder(&mut block.splats));
             film.deposit(&mut block.splats);
         });
@@ -302,6 +336,37 @@ impl Engine for Mlt {
             agreement: None,
         }
     }
+
+    /// Only steps are shared: what comes before them (the first pass and the chains' first states) all ranks have found
+    /// each for itself, at most some 10⁵ samples.
+    fn share(&mut self, company: &Arc<Company>) {
+        self.company = Some(company.clone());
+        if !company.is_first() {
+            self.film = self.sheet.accumulator(self.large_steps.layers());
+        }
+    }
+
+    fn gather(&mut self) {
+        let Some(company) = self.company.clone() else { return };
+        let own = self.own();
+        let saved = self.blocks[own.clone()].iter().map(|block| block.chains.saved());
+        let mut all: Vec<(usize, SavedBaseline)> = own.zip(saved).collect();
+        company.fold(
+            &mut all,
+            |all| postcard::to_stdvec(all).expect("state that can be saved"),
+            |all, bytes| all.extend(postcard::from_bytes::<Vec<_>>(bytes).expect("what a rank told")),
+        );
+        let (sheet, layers) = (self.sheet, self.large_steps.layers());
+        company.gather_film(&mut self.film, || sheet.accumulator(layers));
+        if company.is_first() {
+            let own = self.own();
+            for (i, saved) in all.into_iter().filter(|(i, _)| !own.contains(i)) {
+                self.blocks[i] = Block::restored(self.rng, &self.plan, i, saved, self.large_steps)
+                    .expect("what a rank of the same run told");
+            }
+        }
+    }
+
     fn set_wanted(&mut self, mutations: Option<u64>) {
         let steps = mutations.map(|n| n.saturating_sub(self.bootstrap_samples).max(1));
         self.plan.sweeps = steps.map(|steps| steps.div_ceil(self.plan.a_sweep()));

@@ -169,14 +169,9 @@ pub trait Engine: Send {
     /// yet are not kept.
     fn save(&self, out: &mut dyn Write) -> io::Result<()>;
     /// Shares the work with ranks that all have the same method in the same state.
-    ///
-    /// # Panics
-    /// Where the method has no way to; [`shared::faults`](super::shared::faults) says which.
-    fn share(&mut self, _company: &Arc<Company>) {
-        unreachable!("settings are checked before work is shared");
-    }
+    fn share(&mut self, company: &Arc<Company>);
     /// Brings what all ranks have to the first one, where the work is shared; all must have done the same sweeps.
-    fn gather(&mut self) {}
+    fn gather(&mut self);
     /// The sampler of a path tracer, whose sums may be added to those of others of the same job; nothing for methods whose sums
     /// mean something to themselves only.
     fn points(&self) -> Option<&Sampler<Workspace>> {

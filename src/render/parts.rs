@@ -18,6 +18,7 @@
 //!   1/N.
 
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +29,7 @@ use super::{
 use crate::{
     film::{Image, Plane, Value},
     path::{Workspace, luminance},
+    ranks::Company,
     rng::{Counter, Purpose, Rng},
     scene::Rgb,
     tempering::{Estimate, RoundReport, Sampler},
@@ -434,6 +436,15 @@ impl Engine for Several {
         let mut pool = Pool::new(self.sheet);
         (1..).zip(&self.engines).for_each(|(number, engine)| pool.add(number, engine.as_ref()));
         pool.develop()
+    }
+
+    /// All ranks work on each of the parts in turn.
+    fn share(&mut self, company: &Arc<Company>) {
+        self.engines.iter_mut().for_each(|engine| engine.share(company));
+    }
+
+    fn gather(&mut self) {
+        self.engines.iter_mut().for_each(|engine| engine.gather());
     }
 
     fn set_wanted(&mut self, mutations: Option<u64>) {

@@ -526,6 +526,10 @@ mod tests {
             }
         }
 
+        fn share(&mut self, _: &Arc<Company>) {}
+
+        fn gather(&mut self) {}
+
         fn set_wanted(&mut self, _: Option<u64>) {}
 
         fn save(&self, _: &mut dyn Write) -> io::Result<()> {

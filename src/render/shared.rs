@@ -10,10 +10,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    engine::{Counts, Development, Engine, Phase, Stage},
-    settings::{Method, Settings},
-};
+use super::engine::{Counts, Development, Engine, Phase, Stage};
 use crate::{
     path::Workspace,
     ranks::Company,
@@ -29,18 +26,6 @@ enum Order {
     Gather,
     /// It is over.
     End,
-}
-
-/// What is wrong with settings for a run on ranks.
-pub fn faults(settings: &Settings) -> Vec<String> {
-    let mut faults = Vec::new();
-    if settings.method == Method::Mlt {
-        faults.push("--method mlt: it runs on one rank only; use --part on several machines, or --method re".into());
-    }
-    if settings.parts.of > 1 && settings.parts.only.is_none() {
-        faults.push("--parts: ranks share one part; give each part its own mpirun, with --part".into());
-    }
-    faults
 }
 
 /// The method on the first rank.
@@ -118,6 +103,10 @@ impl Engine for Led {
 
     fn save(&self, out: &mut dyn Write) -> io::Result<()> {
         self.engine.save(out)
+    }
+
+    fn share(&mut self, _: &Arc<Company>) {
+        unreachable!("it is shared already");
     }
 
     fn gather(&mut self) {

@@ -3,14 +3,16 @@
 use std::path::Path;
 
 use super::{
-    LadderChoice, Method, MltSettings, Normalisation, Settings,
+    LadderChoice, Method, MltSettings, Normalisation, Parts, Settings,
     engine::{Counts, Engine, Stage},
     run::{engine, restored},
+    shared::{Led, follow},
 };
 use crate::{
     embree::{Device, Width},
     film::{Footprint, Plane},
     path::{Mapping, MappingKind, Widths},
+    ranks::threads::together,
     rng::Rng,
     saved::Source,
     scene::Scene,
@@ -165,6 +167,46 @@ fn a_run_that_is_saved_and_gone_on_with_gives_the_same_bits() {
                 let pieces = run_in_pieces(&stage, &settings, &[1, 30, 150]);
                 assert!(pieces == whole, "{kind:?}, changes {changes}, {settings:?}");
             }
+        }
+    }
+}
+
+/// Metropolis and replica exchange in two parts, brought together amid the run and at its end: the first rank has all that a run
+/// alone has. Eleven ranks are more than there are blocks.
+#[test]
+fn ranks_come_to_the_bits_of_one_process_by_mlt_and_in_parts() {
+    let scene = scene("cornell-box");
+    let stage = stage(&scene);
+    let saved = |engine: &dyn Engine| {
+        let mut bytes = Vec::new();
+        engine.save(&mut bytes).unwrap();
+        bytes
+    };
+    let go = |engine: &mut dyn Engine| {
+        engine.advance(&stage, u64::MAX, Some(MUTATIONS / 3));
+        engine.gather();
+        let amid = saved(engine);
+        while engine.sweeps_left() != Some(0) {
+            engine.advance(&stage, u64::MAX, None);
+        }
+        engine.gather();
+        (amid, saved(engine), bits(engine))
+    };
+    let mlt = MltSettings { large_steps: 0.5, normalisation: Normalisation::Pooled, kelemen_weights: true };
+    for (method, of) in [(Method::Mlt, 2), (Method::ReplicaExchange, 2)] {
+        let settings = Settings { method, mlt, parts: Parts { of, only: None }, ..Settings::default() };
+        let make = || engine(&stage, &settings, Some(MUTATIONS));
+        let alone = go(make().as_mut());
+        for count in [2, 11] {
+            let shared = together(count, |company| match company.is_first() {
+                true => Some(go(&mut Led::new(make(), company))),
+                false => {
+                    follow(make(), &stage, &company);
+                    None
+                }
+            });
+            let first = shared[0].as_ref().expect("the first comes to something");
+            assert!(*first == alone, "{method:?} in {of} parts on {count} ranks");
         }
     }
 }

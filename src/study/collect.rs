@@ -39,7 +39,7 @@ pub fn collect(
 fn outline(study: &Study, prepared: &[Prepared], folder: &Folder, command: &str) -> Results {
     let methods = study.methods.iter().map(|method| MethodResults {
         name: method.name.clone(),
-        options: method.options.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
+        options: method.all_options().iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "),
         variant: method.variant.clone(),
         runs: Vec::new(),
     });

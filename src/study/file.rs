@@ -25,6 +25,11 @@
 //!
 //! All keys of `[[method]]` but `name`, and those of `[options]`, are options of `relt render` without their dashes, as
 //! TOML numbers, strings or, for flags, `true`. So a study can vary whatever a run can.
+//!
+//! Two more keys are about how a run is done. `ranks = [1, 2, 4]`: on so many ranks, by the launcher that the person at the
+//! keyboard names (`relt study --launch "mpirun -n {ranks}"`; a file starts no programs), in front of a `relt render` that must
+//! be built with the feature `mpi`; their processor time is not known, only wall time. `per-worker = true`: the budget in mutations is that of each worker, threads times ranks
+//! (weak scaling), and not of all together (strong scaling).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -103,6 +108,13 @@ pub struct StudyMethod {
     pub name: String,
     /// Words of a command line: `--method`, `re`, …
     pub options: Vec<String>,
+    /// What starts `relt render` on several ranks, word by word; nothing where the study's own process renders, and until it is
+    /// [named](Study::launch_by).
+    pub launch: Vec<String>,
+    /// Ranks that it starts.
+    pub ranks: Option<u32>,
+    /// Each worker has the study's budget in mutations, not all of them together.
+    pub per_worker: bool,
     /// What was varied: values by option.
     pub variant: Vec<(String, String)>,
     /// What the options say; seed and budget are the run's.
@@ -184,7 +196,7 @@ const SNAPSHOTS: usize = 12;
 /// Errors are first taken after this part of the budget where the study does not say.
 const FIRST_SNAPSHOT: f64 = 1.0 / 64.0;
 /// Options that the study itself sees to, or that have no meaning in it.
-const NOT_OPTIONS: [&str; 15] = [
+const NOT_OPTIONS: [&str; 14] = [
     "seed",
     "mpp",
     "time",
@@ -196,11 +208,15 @@ const NOT_OPTIONS: [&str; 15] = [
     "confine",
     "resume",
     "part",
-    "parts",
     "quiet",
     "verbose",
     "layers",
 ];
+/// Options of a method that say how a run is done and are none of `relt render`.
+const HOW: [&str; 2] = ["ranks", "per-worker"];
+/// Most ranks of a run.
+const MOST_RANKS: u32 = 1 << 20;
+
 /// Reads a study file; `parse` knows the options of methods.
 pub fn read(path: &Path, parse: &ParseOptions) -> Result<Study, StudyError> {
     let text = std::fs::read_to_string(path).map_err(|error| FileError::read(path, error))?;
@@ -444,7 +460,18 @@ impl Reader<'_> {
         options: &[Choice],
         parse: &ParseOptions,
     ) -> Option<StudyMethod> {
-        let words: Vec<String> = options.iter().flat_map(Choice::words).collect();
+        let of_run = options.iter().filter(|option| !HOW.contains(&option.name.as_str()));
+        let words: Vec<String> = of_run.flat_map(Choice::words).collect();
+        let how = HOW.map(|name| options.iter().find(|option| option.name == name).map(|option| &option.value));
+        let ranks = match how[0] {
+            None => None,
+            Some(Value::Integer(n)) if (1..=i64::from(MOST_RANKS)).contains(n) => Some(*n as u32),
+            Some(other) => {
+                self.fault(span.clone(), format!("`ranks` is {other}; accepted are 1 to {MOST_RANKS}"));
+                None
+            }
+        };
+        let per_worker = how[1].is_some_and(|value| value.as_bool() == Some(true));
         let variant: Vec<(String, String)> = options
             .iter()
             .filter(|option| option.varied)
@@ -453,7 +480,15 @@ impl Reader<'_> {
         let chosen = options.iter().find(|option| option.name == "method").and_then(|option| word(&option.value));
         let name = full_name(name, chosen.as_deref().unwrap_or("re"), options, &variant);
         match parse(&words) {
-            Ok(settings) => Some(StudyMethod { name, options: words, variant, settings }),
+            Ok(settings) if per_worker && settings.threads.is_none() => {
+                let what = "`per-worker` wants `threads`, without which nobody knows how many workers there are";
+                self.fault(span, format!("method `{name}`: {what}"));
+                None
+            }
+            Ok(settings) => {
+                let launch = Vec::new();
+                Some(StudyMethod { name, options: words, launch, ranks, per_worker, variant, settings })
+            }
             Err(what) => {
                 let lines = what.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ");
                 self.fault(span, format!("method `{name}`: {lines}"));
@@ -475,6 +510,23 @@ fn full_name(name: Option<&str>, method: &str, options: &[Choice], variant: &[(S
     unmentioned.fold(full, |full, (option, value)| format!("{full}, {option} {value}"))
 }
 
+impl StudyMethod {
+    /// Options as results have them: those of `relt render` and how it is run.
+    pub fn all_options(&self) -> Vec<String> {
+        let ranks = self.ranks.iter().flat_map(|ranks| ["--ranks".to_owned(), ranks.to_string()]);
+        let per_worker = self.per_worker.then(|| "--per-worker".to_owned());
+        self.options.iter().cloned().chain(ranks).chain(per_worker).collect()
+    }
+
+    /// By how much the study's budget in mutations is multiplied.
+    pub fn budgets(&self) -> f64 {
+        match self.per_worker {
+            true => (self.settings.threads.unwrap_or(1) as u64 * u64::from(self.ranks.unwrap_or(1))) as f64,
+            false => 1.0,
+        }
+    }
+}
+
 impl StudyScene {
     /// Reads its file.
     pub fn describe(&self, reach: Reach) -> Result<SceneDescription, LoadError> {
@@ -483,6 +535,22 @@ impl StudyScene {
 }
 
 impl Study {
+    /// Names what starts methods on ranks, with `{ranks}` where their number belongs; a fault where that is missing.
+    pub fn launch_by(&mut self, launcher: Option<&str>) -> Result<(), String> {
+        for method in &mut self.methods {
+            let Some(ranks) = method.ranks else { continue };
+            let words = launcher.unwrap_or_default().split_whitespace();
+            method.launch = words.map(|word| word.replace("{ranks}", &ranks.to_string())).collect();
+            if method.launch.is_empty() {
+                return Err(format!(
+                    "method `{}` is for {ranks} ranks: give --launch, such as --launch \"mpirun -n {{ranks}}\"",
+                    method.name
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// What each run is given, in words.
     pub fn budget_in_words(&self) -> String {
         match self.budget {

@@ -108,7 +108,8 @@ fn id(study: &Study, prepared: &Prepared, scene: usize, method: usize, seed: u64
     let program = env!("CARGO_PKG_VERSION");
     let parts =
         (prepared.checksum, &options.options, seed, study.budget, study.snapshot_times(), keeps_images(study, seed));
-    write!(checksum, "{parts:?} {program}").expect("checksums take all");
+    let how = (&options.launch, options.per_worker);
+    write!(checksum, "{parts:?} {how:?} {program}").expect("checksums take all");
     format!("{}-{}-{seed}-{:08x}", file_name(&names.name), file_name(&options.name), checksum.finish())
 }
 
@@ -141,31 +142,45 @@ impl StudyJob {
 
     /// Settings of the run but for a budget in time.
     pub fn settings(&self, study: &Study) -> Settings {
+        let method = &study.methods[self.method];
         let mutations_per_pixel = match study.budget {
-            Budget::Mutations(mpp) => Some(mpp),
+            Budget::Mutations(mpp) => Some(mpp * method.budgets()),
             Budget::Time(_) => None,
         };
-        Settings { seed: self.seed, mutations_per_pixel, time: None, ..study.methods[self.method].settings.clone() }
+        Settings { seed: self.seed, mutations_per_pixel, time: None, ..method.settings.clone() }
     }
 
     /// A command line that repeats the run.
     pub fn command(&self, study: &Study) -> String {
+        let method = &study.methods[self.method];
+        let launch: String = method.launch.iter().map(|word| quoted(word) + " ").collect();
+        let words: Vec<String> = self.words(study).iter().map(|word| quoted(word)).collect();
+        format!("{launch}relt {}", words.join(" "))
+    }
+
+    /// The words of that command line behind the program.
+    pub fn words(&self, study: &Study) -> Vec<String> {
+        let (scene, method) = (&study.scenes[self.scene], &study.methods[self.method]);
         let budget = match study.budget {
-            Budget::Mutations(mpp) => format!("--mpp {mpp}"),
-            Budget::Time(time) => format!("--time {}ms", time.as_millis()),
+            Budget::Mutations(mpp) => ["--mpp".to_owned(), (mpp * method.budgets()).to_string()],
+            Budget::Time(time) => ["--time".to_owned(), format!("{}ms", time.as_millis())],
         };
-        let options: Vec<String> = study.methods[self.method].options.iter().map(|word| quoted(word)).collect();
-        let scene = scene_words(study, self.scene);
-        format!("relt render {scene} {} --seed {} {budget}", options.join(" "), self.seed)
+        let seed = ["--seed".to_owned(), self.seed.to_string()];
+        let words = ["render".to_owned()].into_iter().chain(words_of_scene(scene, study.reach));
+        words.chain(method.options.iter().cloned()).chain(seed).chain(budget).collect()
     }
 }
 
 /// A scene's file and definitions as they stand on a command line.
 pub fn scene_words(study: &Study, scene: usize) -> String {
-    let scene = &study.scenes[scene];
-    let defines = scene.defines.iter().map(|(name, value)| format!(" -D {}", quoted(&format!("{name}={value}"))));
-    let confine = if study.reach == Reach::Confined { " --confine" } else { "" };
-    quoted(&scene.file.display().to_string()) + &defines.collect::<String>() + confine
+    let words = words_of_scene(&study.scenes[scene], study.reach);
+    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+}
+
+fn words_of_scene(scene: &StudyScene, reach: Reach) -> Vec<String> {
+    let defines = scene.defines.iter().flat_map(|(name, value)| ["-D".to_owned(), format!("{name}={value}")]);
+    let confine = (reach == Reach::Confined).then(|| "--confine".to_owned());
+    [scene.file.display().to_string()].into_iter().chain(defines).chain(confine).collect()
 }
 
 /// A word as a shell takes it.

@@ -81,6 +81,23 @@ pub struct Record {
     pub end: JobEnd,
 }
 
+/// What is of interest in the last line of a run's log.
+#[derive(Deserialize)]
+pub struct LogEnd {
+    /// Wall time since rendering began.
+    pub seconds: f64,
+    /// All of them.
+    pub mutations: u64,
+    /// Those that the process traced that wrote the log, and the others by what they told it last.
+    pub rays: u64,
+    /// c.
+    pub normalisation: Option<f64>,
+    /// Its standard error.
+    pub normalisation_error: Option<f64>,
+    /// What it warned of.
+    pub warnings: Vec<String>,
+}
+
 /// A line of the file.
 #[derive(Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
@@ -129,6 +146,14 @@ impl SharedFile {
     /// Adds a moment.
     pub fn moment(&self, moment: Moment) -> io::Result<()> {
         self.line(&Line::Errors(moment))
+    }
+
+    /// Adds the log of another process, and tells how it ended.
+    pub fn take_log(&self, path: &Path) -> Result<LogEnd, FileError> {
+        let failed = |error: String| FileError::read(path, error);
+        let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+        self.clone().write_all(text.as_bytes()).map_err(|error| failed(error.to_string()))?;
+        serde_json::from_str(text.lines().last().unwrap_or_default()).map_err(|error| failed(error.to_string()))
     }
 
     /// Adds the end, and sees to it that all is on the disk.

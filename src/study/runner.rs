@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::fs::{self, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -126,7 +127,10 @@ impl Runner<'_> {
     }
 
     fn run_to(&self, record: &Path, job: &StudyJob, observer: &dyn Observer) -> Result<(), RunError> {
-        let (scene, method) = (&self.study.scenes[job.scene], &self.study.methods[job.method]);
+        if !self.study.methods[job.method].launch.is_empty() {
+            return self.launch(record, job);
+        }
+        let scene = &self.study.scenes[job.scene];
         let (begin, cpu_begin) = (Instant::now(), cpu_time());
         let description = scene.describe(self.study.reach).map_err(RunError::of)?;
         let loaded = begin.elapsed();
@@ -138,14 +142,9 @@ impl Runner<'_> {
         };
         let file = SharedFile::create(record).map_err(RunError::of)?;
         file.head(JobHead {
-            scene: scene.name.clone(),
-            method: method.name.clone(),
-            options: method.options.clone(),
-            seed: job.seed,
-            command: job.command(self.study),
-            program: self.program.clone(),
             load_seconds: loaded.as_secs_f64(),
             build_seconds: (before.wall - loaded).as_secs_f64(),
+            ..self.head(job)
         })
         .map_err(RunError::of)?;
 
@@ -178,6 +177,63 @@ impl Runner<'_> {
         let set_up = outcome.status.set_up;
         let set_up_seconds = [set_up.calibration, set_up.bootstrap, set_up.adaptation].map(|time| time.as_secs_f64());
         file.end(JobEnd { set_up_seconds, warnings: outcome.warnings }).map_err(RunError::of)
+    }
+
+    /// A run by processes of its own, which the study's launcher starts; it is looked at when it is over. Its time is that of
+    /// its log: what launcher and loading take is left out.
+    fn launch(&self, record: &Path, job: &StudyJob) -> Result<(), RunError> {
+        let (launch, image) = (&self.study.methods[job.method].launch, self.folder.path().join(job.image(None)));
+        let [log, told] = ["log", "told"].map(|extension| record.with_extension(extension));
+        let program = std::env::current_exe().map_err(RunError::of)?;
+        let mut command = Command::new(&launch[0]);
+        command.args(&launch[1..]).arg(program).args(job.words(self.study));
+        command.arg("--quiet").arg("--output").arg(&image).arg("--log").arg(&log);
+        let errors = fs::File::create(&told).map_err(RunError::of)?;
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(errors);
+        let mut child = command.spawn().map_err(|error| RunError::of(format!("{}: {error}", launch[0])))?;
+        let status = loop {
+            if let Some(status) = child.try_wait().map_err(RunError::of)? {
+                break status;
+            }
+            if self.stop.load(Relaxed) {
+                child.kill().and_then(|()| child.wait()).map_err(RunError::of)?;
+                return Err(RunError::Stopped);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        if !status.success() {
+            let told = fs::read_to_string(&told).unwrap_or_default();
+            return Err(RunError::Failed(format!("{}: {status}\n{}", job.command(self.study), told.trim_end())));
+        }
+        let file = SharedFile::create(record).map_err(RunError::of)?;
+        file.head(self.head(job)).map_err(RunError::of)?;
+        let end = file.take_log(&log).map_err(RunError::of)?;
+        let picture = exr_file::read_file(&image).map_err(RunError::of)?.image;
+        let moment = Moment {
+            wall_seconds: end.seconds,
+            cpu_seconds: None,
+            mutations: end.mutations,
+            rays: end.rays,
+            errors: Errors::of(&picture, &self.prepared[job.scene].reference),
+            stated_brightness_error: end.normalisation.zip(end.normalisation_error).map(|(value, error)| error / value),
+            image: Some(job.image(None)),
+        };
+        file.moment(moment).map_err(RunError::of)?;
+        file.end(JobEnd { set_up_seconds: [0.0; 3], warnings: end.warnings }).map_err(RunError::of)?;
+        [log, told].iter().try_for_each(fs::remove_file).map_err(RunError::of)
+    }
+
+    fn head(&self, job: &StudyJob) -> JobHead {
+        let (scene, method) = (&self.study.scenes[job.scene], &self.study.methods[job.method]);
+        JobHead {
+            scene: scene.name.clone(),
+            method: method.name.clone(),
+            options: method.options.clone(),
+            seed: job.seed,
+            command: job.command(self.study),
+            program: self.program.clone(),
+            ..JobHead::default()
+        }
     }
 
     /// When to look at a run but for its end, with the number of each look.

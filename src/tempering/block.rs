@@ -14,9 +14,10 @@ use super::{
 };
 use crate::{
     chain::{Evaluator, Importance, Start, Target, Walkers, draw_decisions, replay},
-    path::{Faults, Whole},
+    path::{Contributions, Faults, Whole},
+    ranks::Group,
     rng::{Counter, Purpose, Rng, open_unit_f64},
-    sample::{Move, StepLaw},
+    sample::{Move, Points, StepLaw},
     saved::{Unfit, expect},
 };
 
@@ -29,6 +30,11 @@ use crate::{
 /// Lanes are the replicas, ladder by ladder, and behind them the offers, ladder by ladder. They are cut into *parts* of
 /// a batch each: one where ladders are short, several where a ladder is longer than a batch. Parts explore side by side,
 /// also on several threads; swaps go between them.
+///
+/// Ranks may [share](Block::share) a block: each then has some of its replicas and some of its offers, and all know on which
+/// rung every replica is. After each exploration they tell one another the ln g of their states and the points that they
+/// offer, from which all draw the same swaps by the same random words. States stay where they are; rungs move. Sums of what was
+/// seen are integers, so that it does not matter who has seen what.
 pub struct Block<W> {
     number: usize,
     first_ladder: u32,
@@ -38,6 +44,12 @@ pub struct Block<W> {
     offers: usize,
     lanes_a_part: usize,
     parts: Vec<Part<W>>,
+    /// The ranks that share the block, and which replicas and which offers are this one's.
+    group: Group,
+    own_replicas: Range<usize>,
+    own_offers: Range<usize>,
+    /// What they all told of the sweep at work; nothing where there is one alone.
+    told: Told,
     /// Rung of each replica, 1 … K − 1.
     rung: Vec<u16>,
     /// Replica on each tempered rung of each ladder; the inverse of `rung`.
@@ -48,11 +60,10 @@ pub struct Block<W> {
     sweeps: u64,
 }
 
-/// A batch of lanes.
+/// A batch of lanes: replicas that follow one another first, then offers.
 struct Part<W> {
-    /// Lanes of the block that lie here.
-    lanes: Range<usize>,
-    /// Those of them that are replicas come first.
+    /// Lane of its first replica.
+    first: usize,
     replicas: usize,
     walkers: Walkers,
     evaluator: Evaluator<W>,
@@ -66,10 +77,35 @@ struct Part<W> {
     words: Vec<[u32; 4]>,
 }
 
-/// A [`Block`] as it is saved.
+/// What ranks that share a block tell after an exploration.
+#[derive(Serialize, Deserialize)]
+struct News {
+    /// Of their replicas' states.
+    ln_g: Vec<f64>,
+    /// The points that they offer.
+    offered: Walkers,
+}
+
+/// The same of all of them.
+#[derive(Default)]
+struct Told {
+    /// Of all replicas' states.
+    ln_g: Vec<f64>,
+    /// Points and what they contribute, by rank.
+    offered: Vec<(Points, Contributions)>,
+    /// Rank of each offer, and its place there.
+    place: Vec<(usize, usize)>,
+}
+
+/// A [`Block`] as it is saved, however it was cut: what it works with between two sweeps follows from the job.
 #[derive(Serialize, Deserialize)]
 pub struct SavedBlock {
-    parts: Vec<SavedPart>,
+    walkers: Walkers,
+    refused: Vec<u32>,
+    tally: SavedTally,
+    /// Of replayed starts, which no sweep has accounted for yet.
+    rays: u64,
+    faults: Faults,
     rung: Vec<u16>,
     trips: Trips,
     index: Option<IndexProcess>,
@@ -79,21 +115,34 @@ pub struct SavedBlock {
 /// What a [`Block`] saw, without where its chains are: what a rank needs of the blocks of others to learn from them.
 #[derive(Serialize, Deserialize)]
 pub struct BlockStatistics {
-    tallies: Vec<SavedTally>,
+    tally: SavedTally,
     trips: Trips,
     index: Option<IndexProcess>,
     sweeps: u64,
 }
 
-/// A [`Part`] as it is saved: what it works with between two sweeps follows from the job.
-#[derive(Serialize, Deserialize)]
-struct SavedPart {
-    walkers: Walkers,
-    tally: SavedTally,
-    refused: Vec<u32>,
-    /// Of replayed starts, which no sweep has accounted for yet.
-    rays: u64,
-    faults: Faults,
+impl SavedBlock {
+    /// What a rank that shares the block has of it. What was seen stays whole.
+    fn part_of(self, group: &Group) -> SavedBlock {
+        let own = group.own(self.rung.len());
+        let (rays, faults) = if group.is_first() { (self.rays, self.faults) } else { (0, Faults::default()) };
+        SavedBlock {
+            walkers: self.walkers.some(own.clone()),
+            refused: self.refused[own].to_vec(),
+            rays,
+            faults,
+            ..self
+        }
+    }
+
+    /// Adds what the next of the ranks that share the block has of it.
+    pub fn join(&mut self, next: SavedBlock) {
+        self.walkers = Walkers::joined([&self.walkers, &next.walkers].into_iter());
+        self.refused.extend(next.refused);
+        self.tally.merge(&next.tally);
+        self.rays += next.rays;
+        self.faults.merge(&next.faults);
+    }
 }
 
 impl<W: Default + Send> Block<W> {
@@ -119,44 +168,84 @@ impl<W: Default + Send> Block<W> {
             offers,
             lanes_a_part,
             parts: Vec::new(),
+            group: Group::alone(),
+            own_replicas: 0..0,
+            own_offers: 0..0,
+            told: Told::default(),
             rung: (0..replicas).map(|lane| (lane % chains) as u16 + 1).collect(),
             replica_on: (0..replicas).map(|lane| (lane % chains) as u16).collect(),
             trips: Trips::new(replicas, chains),
             index: (first_ladder == 0).then(IndexProcess::default),
             sweeps: 0,
         };
-        let lanes = block.lanes();
-        for start in (0..lanes).step_by(lanes_a_part) {
-            let range = start..(start + lanes_a_part).min(lanes);
-            let own = replicas.clamp(range.start, range.end) - range.start;
-            let mut evaluator = Evaluator::new(rng, range.clone().map(|lane| block.counter(lane)).collect());
+        block.cut(rng, film, layers, None);
+        block
+    }
+
+    /// Cuts the lanes that are worked on here into parts, all without states.
+    fn cut(&mut self, rng: Rng, film: [u32; 2], layers: usize, importance: Option<Arc<Importance>>) {
+        let (replicas, offers) = (self.rung.len(), self.ladders * self.offers);
+        let [own_replicas, own_offers] = [replicas, offers].map(|lanes| self.group.own(lanes));
+        let lanes: Vec<usize> = own_replicas.clone().chain(own_offers.clone().map(|i| replicas + i)).collect();
+        let part = |(number, lanes): (usize, &[usize])| {
+            let first = (own_replicas.start + number * self.lanes_a_part).min(own_replicas.end);
+            let own = lanes.iter().filter(|lane| **lane < replicas).count();
+            let mut evaluator = Evaluator::new(rng, lanes.iter().map(|lane| self.counter(*lane)).collect());
             evaluator.film = film; // of the stratified points that chains start from
-            block.parts.push(Part {
+            evaluator.importance = importance.clone();
+            Part {
+                first,
                 replicas: own,
                 walkers: Walkers::new(own),
                 evaluator,
-                tally: Tally::new(rungs, layers),
+                tally: Tally::new(self.chains + 1, layers),
                 refused: vec![0; own],
                 scale: vec![0; own],
                 decision: vec![0; own],
                 words: Vec::new(),
-                lanes: range,
-            });
-        }
-        block
+            }
+        };
+        // one part at least, for what is seen of swaps
+        let parts: Vec<&[usize]> = if lanes.is_empty() { vec![&[]] } else { lanes.chunks(self.lanes_a_part).collect() };
+        self.parts = parts.into_iter().enumerate().map(part).collect();
+        (self.own_replicas, self.own_offers) = (own_replicas, own_offers);
+        let of_rank = |rank: usize| (0..self.group.of(rank, offers).len()).map(move |at| (rank, at));
+        self.told.place = (0..self.group.count()).flat_map(of_rank).collect();
     }
 
-    /// All that there is to save between sweeps.
+    /// Cuts it anew, with all that it is at.
+    fn cut_anew(&mut self, saved: SavedBlock) {
+        let Evaluator { film, importance, .. } = &self.parts[0].evaluator;
+        let (film, importance) = (*film, importance.clone());
+        self.cut(self.rng(), film, self.parts[0].tally.splats.layers(), importance);
+        self.restore(saved).expect("its own state");
+    }
+
+    /// Leaves to other ranks what is theirs of a whole block. What was seen stays whole.
+    pub fn share(&mut self, group: &Group) {
+        let saved = self.saved().part_of(group);
+        self.group = group.clone();
+        self.cut_anew(saved);
+    }
+
+    /// Changes the number of points offered to a ladder each sweep; when all splats are deposited.
+    pub fn set_offers(&mut self, offers: usize) {
+        if offers != self.offers {
+            self.offers = offers;
+            self.cut_anew(self.saved());
+        }
+    }
+
+    /// All that there is to save between sweeps; of a block that is shared, what this rank has of it.
     pub fn saved(&self) -> SavedBlock {
-        let part = |part: &Part<W>| SavedPart {
-            walkers: part.walkers.clone(),
-            tally: part.tally.saved(),
-            refused: part.refused.clone(),
-            rays: part.evaluator.out.rays,
-            faults: part.evaluator.out.faults.clone(),
-        };
+        let mut faults = Faults::default();
+        self.parts.iter().for_each(|part| faults.merge(&part.evaluator.out.faults));
         SavedBlock {
-            parts: self.parts.iter().map(part).collect(),
+            walkers: Walkers::joined(self.parts.iter().map(|part| &part.walkers)),
+            refused: self.parts.iter().flat_map(|part| &part.refused).copied().collect(),
+            tally: self.seen(),
+            rays: self.parts.iter().map(|part| part.evaluator.out.rays).sum(),
+            faults,
             rung: self.rung.clone(),
             trips: self.trips.clone(),
             index: self.index.clone(),
@@ -164,16 +253,27 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
-    /// Goes on where a block with the same ladders and offers was saved.
+    /// What all parts saw.
+    fn seen(&self) -> SavedTally {
+        let mut seen = self.parts[0].tally.saved();
+        self.parts[1..].iter().for_each(|part| seen.merge(&part.tally.saved()));
+        seen
+    }
+
+    /// A block without states goes on where one with the same ladders and offers was saved.
     pub fn restore(&mut self, saved: SavedBlock) -> Result<(), Unfit> {
-        let SavedBlock { parts, rung, trips, index, sweeps } = saved;
-        expect(parts.len() == self.parts.len() && index.is_some() == self.index.is_some(), "ladders")?;
-        for (part, saved) in self.parts.iter_mut().zip(parts) {
-            expect(saved.walkers.fits(part.replicas) && saved.refused.len() == part.replicas, "chains")?;
-            part.tally.restore(saved.tally)?;
-            (part.walkers, part.refused) = (saved.walkers, saved.refused);
-            (part.evaluator.out.rays, part.evaluator.out.faults) = (saved.rays, saved.faults);
+        let SavedBlock { walkers, refused, tally, rays, faults, rung, trips, index, sweeps } = saved;
+        expect(index.is_some() == self.index.is_some(), "ladders")?;
+        expect(walkers.fits(self.own_replicas.len()) && refused.len() == self.own_replicas.len(), "chains")?;
+        for part in &mut self.parts {
+            let first = part.first - self.own_replicas.start;
+            let own = first..first + part.replicas;
+            part.walkers = walkers.some(own.clone());
+            part.refused.copy_from_slice(&refused[own]);
         }
+        let first = &mut self.parts[0];
+        first.tally.restore(tally)?;
+        (first.evaluator.out.rays, first.evaluator.out.faults) = (rays, faults);
         expect(rung.len() == self.rung.len() && trips.fits(rung.len(), self.chains), "replicas")?;
         let mut replica_on = vec![u16::MAX; rung.len()];
         for (lane, k) in rung.iter().enumerate() {
@@ -189,7 +289,7 @@ impl<W: Default + Send> Block<W> {
     /// What was seen, without where chains are.
     pub fn statistics(&self) -> BlockStatistics {
         BlockStatistics {
-            tallies: self.parts.iter().map(|part| part.tally.saved()).collect(),
+            tally: self.seen(),
             trips: self.trips.clone(),
             index: self.index.clone(),
             sweeps: self.sweeps,
@@ -198,47 +298,30 @@ impl<W: Default + Send> Block<W> {
 
     /// Takes what a block with the same ladders and offers saw; chains stay as they are here.
     pub fn set_statistics(&mut self, told: BlockStatistics) -> Result<(), Unfit> {
-        let BlockStatistics { tallies, trips, index, sweeps } = told;
-        expect(tallies.len() == self.parts.len() && index.is_some() == self.index.is_some(), "ladders")?;
+        let BlockStatistics { tally, trips, index, sweeps } = told;
+        expect(index.is_some() == self.index.is_some(), "ladders")?;
         expect(trips.fits(self.rung.len(), self.chains), "replicas")?;
-        for (part, tally) in self.parts.iter_mut().zip(tallies) {
-            part.tally.restore(tally)?;
-        }
+        self.forget();
+        self.parts[0].tally.restore(tally)?;
         (self.trips, self.index, self.sweeps) = (trips, index, sweeps);
         Ok(())
     }
 
-    /// Changes the number of points offered to a ladder each sweep.
-    pub fn set_offers(&mut self, rng: Rng, offers: usize) {
-        if offers == self.offers {
-            return;
-        }
-        self.offers = offers;
-        let layers = self.parts[0].tally.splats.layers();
-        let rungs = self.chains + 1;
-        let (lanes, replicas) = (self.lanes(), self.rung.len());
-        let parts = lanes.div_ceil(self.lanes_a_part);
-        self.parts.truncate(parts.max(replicas.div_ceil(self.lanes_a_part)));
-        for number in 0..parts {
-            let start = number * self.lanes_a_part;
-            let range = start..(start + self.lanes_a_part).min(lanes);
-            let mut evaluator = Evaluator::new(rng, range.clone().map(|lane| self.counter(lane)).collect());
-            evaluator.importance = self.parts[0].evaluator.importance.clone();
-            match self.parts.get_mut(number) {
-                Some(part) => (part.lanes, part.evaluator) = (range, evaluator),
-                None => self.parts.push(Part {
-                    lanes: range,
-                    replicas: 0,
-                    walkers: Walkers::new(0),
-                    evaluator,
-                    tally: Tally::new(rungs, layers),
-                    refused: Vec::new(),
-                    scale: Vec::new(),
-                    decision: Vec::new(),
-                    words: Vec::new(),
-                }),
-            }
-        }
+    /// Adds what another rank that shares the block saw.
+    pub fn add_statistics(&mut self, told: BlockStatistics) -> Result<(), Unfit> {
+        let mut seen = self.seen();
+        seen.merge(&told.tally);
+        self.forget();
+        self.parts[0].tally.restore(seen)
+    }
+
+    /// Forgets what was seen of states, swaps and points.
+    pub fn forget(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.tally.forget());
+    }
+
+    fn rng(&self) -> Rng {
+        self.parts[0].evaluator.rng()
     }
 
     /// The counter of a lane: replicas are numbered from 0, offers behind them.
@@ -267,9 +350,34 @@ impl<W: Default + Send> Block<W> {
         self.ladders * (self.chains + self.offers)
     }
 
-    /// Part of a lane, and its place there.
-    fn place(&self, lane: usize) -> (usize, usize) {
-        (lane / self.lanes_a_part, lane % self.lanes_a_part)
+    /// Part of a replica, and its place there, where it is this rank's.
+    fn place(&self, replica: usize) -> Option<(usize, usize)> {
+        let own = self.own_replicas.contains(&replica);
+        own.then(|| replica - self.own_replicas.start).map(|slot| (slot / self.lanes_a_part, slot % self.lanes_a_part))
+    }
+
+    /// The same of an offer, where there is one rank alone.
+    fn place_of_offer(&self, offer: usize) -> (usize, usize) {
+        let slot = self.rung.len() + offer;
+        (slot / self.lanes_a_part, slot % self.lanes_a_part)
+    }
+
+    /// ln g of a replica's state.
+    fn ln_g(&self, replica: usize) -> f64 {
+        match self.place(replica).filter(|_| self.group.is_alone()) {
+            Some((part, at)) => self.parts[part].walkers.states[at].ln_g,
+            None => self.told.ln_g[replica],
+        }
+    }
+
+    /// ln g of an offered point.
+    fn ln_offered(&self, offer: usize) -> f64 {
+        if self.group.is_alone() {
+            let (part, at) = self.place_of_offer(offer);
+            return self.parts[part].evaluator.out.lanes[at].ln_g;
+        }
+        let (rank, at) = self.told.place[offer];
+        self.told.offered[rank].1.lanes[at].ln_g
     }
 
     /// Scalar contributions are weighed by this importance, if there is any; from before the first state on.
@@ -286,7 +394,7 @@ impl<W: Default + Send> Block<W> {
             starts[replica][(ladder + replica * self.ladders.div_ceil(self.chains)) % self.ladders]
         };
         for part in &mut self.parts {
-            let starts: Vec<Start> = part.lanes.clone().take(part.replicas).map(of_lane).collect();
+            let starts: Vec<Start> = (part.first..part.first + part.replicas).map(of_lane).collect();
             replay(target, &starts, &mut part.walkers, &mut part.evaluator);
         }
     }
@@ -301,6 +409,7 @@ impl<W: Default + Send> Block<W> {
                 [part] => explore(part),
                 parts => parts.par_iter_mut().for_each(explore),
             }
+            self.tell();
             self.inject(canvas, round);
             self.swap(canvas, round);
             for (lane, k) in self.rung.iter().enumerate() {
@@ -313,36 +422,78 @@ impl<W: Default + Send> Block<W> {
         }
     }
 
+    /// Tells the ranks that share the block how high this one's states are and which points it offers, and hears the same
+    /// of theirs.
+    fn tell(&mut self) {
+        if self.group.is_alone() {
+            return;
+        }
+        let mut offered = Walkers::new(self.own_offers.len());
+        let mut ln_g = Vec::with_capacity(self.own_replicas.len());
+        let mut to = 0;
+        for part in &self.parts {
+            ln_g.extend(part.walkers.states.iter().map(|state| state.ln_g));
+            let Evaluator { points, out, .. } = &part.evaluator;
+            for at in part.replicas..out.lanes.len() {
+                offered.replace(to, (points, at), out, &mut |_, _| ());
+                to += 1;
+            }
+        }
+        let all = self.group.everywhere(&News { ln_g, offered });
+        (self.told.ln_g, self.told.offered) = (Vec::new(), Vec::new());
+        for News { ln_g, offered: Walkers { points, states, elsewhere, .. } } in all {
+            self.told.ln_g.extend(ln_g);
+            self.told.offered.push((points, Contributions { lanes: states, elsewhere, ..Contributions::new(0) }));
+        }
+    }
+
     /// Offers each fresh point to the lowest chain of its ladder, a swap that costs nothing.
     #[inline(never)] // profiles tell what it takes
     fn inject(&mut self, canvas: &Canvas, round: &Round) {
+        let rng = self.rng();
         let replicas = self.rung.len();
         let lowest = round.ladder.betas()[1];
-        for i in 0..self.ladders * self.offers {
-            let ladder = i / self.offers;
-            let lane = ladder * self.chains + usize::from(self.replica_on[ladder * self.chains]);
-            let ((from, at), (to, place)) = (self.place(replicas + i), self.place(lane));
-            let ln_offered = self.parts[from].evaluator.out.lanes[at].ln_g;
-            let alpha = swap_acceptance(0.0, ln_offered, lowest, self.parts[to].walkers.states[place].ln_g);
-            self.parts[to].tally.counts[1].swaps.add(alpha);
+        for offer in 0..self.ladders * self.offers {
+            let base = offer / self.offers * self.chains;
+            let lane = base + usize::from(self.replica_on[base]);
+            let alpha = swap_acceptance(0.0, self.ln_offered(offer), lowest, self.ln_g(lane));
+            if let Some((part, _)) = self.place(lane) {
+                self.parts[part].tally.counts[1].swaps.add(alpha);
+            }
             if alpha == 0.0 {
                 continue;
             }
-            let evaluator = &self.parts[from].evaluator;
-            let counter = Counter { purpose: Purpose::Swap, ..evaluator.counters[at] };
-            if open_unit_f64(evaluator.rng().words(counter, 0)[0]) < alpha {
+            let counter = Counter { purpose: Purpose::Swap, ..self.counter(replicas + offer) };
+            if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
                 self.trips.renewed(lane);
-                if from == to {
-                    let Part { walkers, evaluator, tally, .. } = &mut self.parts[to];
-                    let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
-                    walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
-                } else {
-                    let parts = self.parts.get_disjoint_mut([from, to]).expect("two parts");
-                    let [Part { evaluator, .. }, Part { walkers, tally, .. }] = parts;
-                    let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
-                    walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
-                }
+                self.take(lane, offer, canvas, round);
             }
+        }
+    }
+
+    /// Puts the lowest chain of a ladder into an offered point.
+    fn take(&mut self, lane: usize, offer: usize, canvas: &Canvas, round: &Round) {
+        if !self.group.is_alone() {
+            self.told.ln_g[lane] = self.ln_offered(offer);
+        }
+        let Some((to, place)) = self.place(lane) else { return };
+        if !self.group.is_alone() {
+            let (rank, at) = self.told.place[offer];
+            let (points, out) = &self.told.offered[rank];
+            let Part { walkers, tally, .. } = &mut self.parts[to];
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+            return walkers.replace(place, (points, at), out, &mut record);
+        }
+        let (from, at) = self.place_of_offer(offer);
+        if from == to {
+            let Part { walkers, evaluator, tally, .. } = &mut self.parts[to];
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+            walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
+        } else {
+            let parts = self.parts.get_disjoint_mut([from, to]).expect("two parts");
+            let [Part { evaluator, .. }, Part { walkers, tally, .. }] = parts;
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+            walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
         }
     }
 
@@ -350,7 +501,7 @@ impl<W: Default + Send> Block<W> {
     /// [`advance`](Self::advance).
     #[inline(never)] // profiles tell what it takes
     pub fn swap(&mut self, canvas: &Canvas, round: &Round) {
-        let rng = self.parts[0].evaluator.rng();
+        let rng = self.rng();
         let betas = round.ladder.betas();
         for ladder in 0..self.ladders {
             let base = ladder * self.chains;
@@ -359,11 +510,14 @@ impl<W: Default + Send> Block<W> {
                 let colder = hotter + 1;
                 let lanes = [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
                 let places = lanes.map(|lane| self.place(lane));
-                let [h, c] = places.map(|(part, at)| self.parts[part].walkers.states[at].ln_g);
+                let [h, c] = lanes.map(|lane| self.ln_g(lane));
                 let alpha = swap_acceptance(betas[hotter], h, betas[colder], c);
-                self.parts[places[1].0].tally.counts[colder].swaps.add(alpha);
+                if let Some((part, _)) = places[1] {
+                    self.parts[part].tally.counts[colder].swaps.add(alpha);
+                }
                 if open_unit_f64(rng.words(counter, colder as u16)[0]) < alpha {
-                    for ((part, at), k) in places.into_iter().zip([hotter, colder]) {
+                    for (place, k) in places.into_iter().zip([hotter, colder]) {
+                        let Some((part, at)) = place else { continue };
                         let Part { walkers, tally, .. } = &mut self.parts[part];
                         walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
                     }
@@ -378,7 +532,7 @@ impl<W: Default + Send> Block<W> {
     pub fn flush(&mut self, canvas: &Canvas, round: &Round) {
         for part in &mut self.parts {
             for at in 0..part.replicas {
-                let k = usize::from(self.rung[part.lanes.start + at]);
+                let k = usize::from(self.rung[part.first + at]);
                 let tally = &mut part.tally;
                 part.walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
             }
@@ -389,7 +543,7 @@ impl<W: Default + Send> Block<W> {
     pub fn pending(&self, canvas: &Canvas, round: &Round, tally: &mut Tally) {
         for part in &self.parts {
             for (at, &weight) in part.walkers.pending.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                let k = usize::from(self.rung[part.lanes.start + at]);
+                let k = usize::from(self.rung[part.first + at]);
                 tally.state(canvas, round, k, part.walkers.whole(at), weight);
             }
         }
@@ -477,6 +631,9 @@ impl<W: Default> Part<W> {
         rung: &[u16],
         sweep: u64,
     ) {
+        if self.evaluator.counters.is_empty() {
+            return;
+        }
         let rng = self.evaluator.rng();
         self.evaluator.counters.iter_mut().for_each(|counter| counter.step = sweep);
         if target.changes_techniques() {
@@ -485,7 +642,7 @@ impl<W: Default> Part<W> {
         self.evaluator.moves[self.replicas..].fill(Move::Fresh);
         draw_decisions(rng, &self.evaluator.counters[..self.replicas], &mut self.words);
         for (at, &[decision, choice, ..]) in self.words.iter().enumerate() {
-            let k = usize::from(rung[self.lanes.start + at]);
+            let k = usize::from(rung[self.first + at]);
             self.decision[at] = decision;
             self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
             self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);
@@ -495,15 +652,14 @@ impl<W: Default> Part<W> {
         let Part { walkers, evaluator, tally, .. } = self;
         let half = usize::from(sweep >= round.half);
         for at in 0..self.replicas {
-            let k = usize::from(rung[self.lanes.start + at]);
+            let k = usize::from(rung[self.first + at]);
             let beta = round.ladder.betas()[k];
             let u = open_unit_f64(self.decision[at]);
             let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
             let alpha = walkers.step(at, beta, (&evaluator.points, at), &evaluator.out, u, &mut record);
             let counts = &mut tally.counts[k];
             counts.steps[usize::from(self.scale[at])].add(alpha);
-            let [sum, weight] = &mut counts.halves[half];
-            (*sum, *weight) = (*sum + walkers.states[at].ln_g, *weight + 1.0);
+            counts.halves[half].add(walkers.states[at].ln_g);
             self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
@@ -525,8 +681,8 @@ impl<W: Default> Part<W> {
         round: &Round,
         rung: &[u16],
     ) {
-        let Part { walkers, evaluator, tally, lanes, replicas, .. } = self;
-        let rung_of = |at: usize| usize::from(rung[lanes.start + at]);
+        let Part { walkers, evaluator, tally, first, replicas, .. } = self;
+        let rung_of = |at: usize| usize::from(rung[*first + at]);
         let beta_of = |at: usize| round.ladder.betas()[rung_of(at)];
         evaluator.propose_changes(target, &walkers.points, *replicas, beta_of);
         for i in 0..evaluator.drawn.len() {
@@ -554,7 +710,7 @@ mod tests {
             let blocks = (0..3).map(|number| Block::<()>::new(rng, (number, 3), rungs, 1, lanes_a_part, 1, [1, 1]));
             let mut blocks: Vec<Block<()>> = blocks.collect();
             for offers in [1, 4] {
-                blocks.iter_mut().for_each(|block| block.set_offers(rng, offers));
+                blocks.iter_mut().for_each(|block| block.set_offers(offers));
                 let parts = blocks.iter().flat_map(|block| &block.parts);
                 let counters: Vec<Counter> = parts.flat_map(|part| part.evaluator.counters.clone()).collect();
                 let words: HashSet<[u32; 4]> = counters.iter().map(|counter| rng.words(*counter, 0)).collect();

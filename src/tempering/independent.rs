@@ -10,6 +10,7 @@ use super::{Canvas, Round, Tally};
 use crate::{
     chain::{Evaluator, Importance, Start, Target},
     path::Faults,
+    ranks::Group,
     rng::{Counter, Purpose, Rng},
     sample::{Move, PixelOrder, Points},
     saved::{Unfit, expect},
@@ -63,12 +64,12 @@ impl<W: Default> Independent<W> {
         }
     }
 
-    /// Evaluates and records the block's next `points` points; all blocks are asked for as many. `keep` is told of each
-    /// that chose.
+    /// Evaluates and records the block's next `points` points, those of them that are this rank's among a `group` that
+    /// shares the block; all blocks are asked for as many. `keep` is told of each that chose.
     pub fn sweep<T: Target<Workspace = W>>(
         &mut self,
         target: &T,
-        (points, purpose): (usize, Use),
+        (points, purpose, group): (usize, Use, Option<&Group>),
         canvas: &Canvas,
         round: &Round,
         tally: &mut Tally,
@@ -79,14 +80,23 @@ impl<W: Default> Independent<W> {
         let mut left = points;
         while left > 0 {
             let lanes = left.min(LANES);
-            let group = self.group(next);
-            if group != self.group {
+            let counted_for = self.group(next);
+            if counted_for != self.group {
                 canvas.groups.take(self.group, tally);
-                self.group = group;
+                self.group = counted_for;
+            }
+            left -= lanes;
+            next += lanes as u64;
+            let own = group.map_or(0..0, |group| group.own(lanes));
+            let batch = counters.by_ref().take(lanes).enumerate();
+            let mine = batch.filter(|(i, _)| own.contains(i)).map(|(_, counter)| counter);
+            self.evaluator.counters.iter_mut().zip(mine).for_each(|(c, next)| *c = next);
+            let lanes = own.len();
+            if lanes == 0 {
+                continue;
             }
             self.evaluator.moves[..lanes].fill(Move::Stratified);
             self.evaluator.moves[lanes..].fill(Move::Rest);
-            self.evaluator.counters[..lanes].iter_mut().zip(&mut counters).for_each(|(c, next)| *c = next);
             if purpose == Use::OpenImage {
                 self.evaluator.evaluate_open(target, &self.nowhere);
             } else {
@@ -104,8 +114,6 @@ impl<W: Default> Independent<W> {
                 }
                 keep(Start { counter: *counter, ln_g: point.main.ln_g });
             }
-            left -= lanes;
-            next += lanes as u64;
         }
         self.drawn += (self.blocks * points) as u64;
     }

@@ -250,10 +250,10 @@ pub struct RungCounts {
     pub changes: TechniqueChanges,
     /// Swaps with the next hotter rung.
     pub swaps: StepCount,
-    /// Σ of ln g and weight of states in the two halves of the round.
-    pub halves: [[f64; 2]; 2],
-    /// Luminance that went to the balanced image, in the unit of the weights.
-    pub luminance: f64,
+    /// ln g of states in the two halves of the round.
+    pub halves: [LnMean; 2],
+    /// Luminance that went to the balanced image, in the unit of the weights, and its weight.
+    pub luminance: Sum,
     /// Most steps in a row that a chain refused.
     pub longest_rejection: u32,
 }
@@ -264,9 +264,38 @@ impl RungCounts {
         self.steps.iter_mut().zip(other.steps).for_each(|(a, b)| *a += b);
         self.changes.merge(&other.changes);
         self.swaps += other.swaps;
-        self.halves.as_flattened_mut().iter_mut().zip(other.halves.as_flattened()).for_each(|(a, b)| *a += b);
-        self.luminance += other.luminance;
+        self.halves.iter_mut().zip(other.halves).for_each(|(a, b)| a.merge(b));
+        self.luminance.merge(other.luminance);
         self.longest_rejection = self.longest_rejection.max(other.longest_rejection);
+    }
+}
+
+/// Σ of ln g over states in steps of 2⁻³⁰ nat, which do not depend on the order of addition, and the number of states.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LnMean {
+    sum: i128,
+    states: u64,
+}
+
+/// 2³⁰.
+const NAT_STEPS: f64 = (1u64 << 30) as f64;
+
+impl LnMean {
+    /// Adds a lit state.
+    #[inline(always)]
+    pub fn add(&mut self, ln_g: f64) {
+        self.sum += i128::from((ln_g * NAT_STEPS) as i64);
+        self.states += 1;
+    }
+
+    fn merge(&mut self, other: LnMean) {
+        self.sum += other.sum;
+        self.states += other.states;
+    }
+
+    /// Mean of ln g; nothing without states.
+    pub fn mean(self) -> Option<f64> {
+        (self.states > 0).then(|| self.sum as f64 / NAT_STEPS / self.states as f64)
     }
 }
 
@@ -298,6 +327,17 @@ pub struct Tally {
     pub tempered: Sum,
     /// S of the outcomes of one open point.
     mixtures: Vec<f64>,
+}
+
+impl SavedTally {
+    /// Adds what another one saw.
+    pub fn merge(&mut self, other: &SavedTally) {
+        self.histograms.iter_mut().zip(&other.histograms).for_each(|(sum, h)| sum.merge(h));
+        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, counts)| sum.add(counts));
+        self.hot.merge(other.hot);
+        self.even.merge(other.even);
+        self.tempered.merge(other.tempered);
+    }
 }
 
 impl Tally {
@@ -337,6 +377,13 @@ impl Tally {
         Ok(())
     }
 
+    /// Forgets all that is saved.
+    pub fn forget(&mut self) {
+        self.histograms.fill(Histogram::default());
+        self.reset_counts();
+        [self.hot, self.even, self.tempered] = [Sum::default(); 3];
+    }
+
     /// Records a uniform point; the film counts dark ones too. Probes are for `stratified` ones, the usual kind, where there
     /// are any: offered ones are noisier.
     #[inline(always)]
@@ -359,8 +406,9 @@ impl Tally {
             let [effort, _] = round.effort;
             let share = effort * round.weights.uniform(mixture);
             layer.splat(&mut recorder, point, share, effort);
-            self.counts[0].luminance += share * luminance;
-            self.hot.add(share * luminance / canvas.unit, effort);
+            let shown = share * luminance / canvas.unit;
+            self.counts[0].luminance.add(shown, effort);
+            self.hot.add(shown, effort);
         }
         if stratified || round.only_offers {
             for (part, points) in point.parts().zip(std::iter::once(1.0).chain(std::iter::repeat(0.0))) {
@@ -408,7 +456,7 @@ impl Tally {
             let share = |i: usize| effort * round.weights.uniform(mixtures[i]);
             recorder.splat_outcomes(pair(layer), film, outcomes, share, effort);
             let sum: f64 = outcomes.iter().enumerate().map(|(i, outcome)| share(i) * outcome.splat.luminance()).sum();
-            self.counts[0].luminance += sum;
+            self.counts[0].luminance.add(sum / canvas.unit, effort);
             self.hot.add(sum / canvas.unit, effort);
         }
         if let Some(probe) = canvas.probe(film) {
@@ -440,9 +488,9 @@ impl Tally {
         if let Some(first) = canvas.layers.rungs {
             recorder.splat(first + k - 1, state, value, effort * weight);
         }
-        let luminance = state.main.luminance();
-        self.counts[k].luminance += value * luminance;
-        self.tempered.add(value * luminance / canvas.unit, effort * weight);
+        let shown = value * state.main.luminance() / canvas.unit;
+        self.counts[k].luminance.add(shown, effort * weight);
+        self.tempered.add(shown, effort * weight);
         for part in state.parts() {
             let Some(probe) = canvas.probe(part.film) else { continue };
             let g = part.luminance();
@@ -532,7 +580,10 @@ mod tests {
         let probed = |ratio, of: [usize; 2]| [0, 1].map(|probe| of.map(|i| probes.sums(ratio)[probe][0][i]));
         near(probed(0, [0, 2]), [[1.0, 1.0], [3.0, 0.0]], "points and their number in probes");
         near(probed(EVEN, [1, 3]), [[0.1, 0.02], [0.3, 0.5 * (0.04 + 0.16)]], "states and their squares in probes");
-        assert!((tally.counts[0].luminance - 1.6).abs() < 1e-6 && (tally.counts[1].luminance - 0.2).abs() < 1e-6);
+        assert!(
+            (tally.counts[0].luminance.values().0 - 1.6).abs() < 1e-6
+                && (tally.counts[1].luminance.values().0 - 0.2).abs() < 1e-6
+        );
     }
 
     #[test]

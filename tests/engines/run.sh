@@ -2,12 +2,13 @@
 # Real engines on this machine, with faults while they run: whatever happens, the merged image is that of `--parts N` bit by
 # bit, and nothing is lost but the work since the last checkpoint.
 #
-#     cargo build --release && tests/engines/run.sh [hyperqueue] [slurm] [mpi] [faults]
+#     cargo build --release && tests/engines/run.sh [hyperqueue] [slurm] [mpi] [network] [faults]
 #
 # Not part of `cargo test`, for it wants what few machines have:
 #   hyperqueue  python3 with venv; installs HyperQueue from PyPI into the scratch folder
 #   slurm       as root: apt-get install slurm-wlm munge; one node, whose daemons end with the script
 #   mpi         apt-get install openmpi-bin; `cargo build --release --features mpi`
+#   network     as mpi, and as root with iproute2: two network namespaces are two hosts, and the wire between them is cut
 #   faults      as root, for a small tmpfs; apt-get install faketime
 # Logs of all that was run stay in the scratch folder, which is told at the end.
 set -u
@@ -19,6 +20,7 @@ parts=3
 scratch=$(mktemp -d "${TMPDIR:-/tmp}/relt-engines.XXXXXX")
 failed=0
 started=()
+hosts=()
 
 say() { printf '%s\n' "$*"; }
 # A sentence, then a command that says whether it is true.
@@ -33,6 +35,7 @@ clean() {
     for pid in "${started[@]}"; do kill "$pid" 2>/dev/null; done
     sleep 2
     for pid in "${started[@]}"; do kill -9 "$pid" 2>/dev/null; done
+    for pid in "${hosts[@]}"; do ip netns del "$pid" 2>/dev/null; done
     umount "$scratch/small" 2>/dev/null
     say "logs in $scratch"
 }
@@ -191,6 +194,14 @@ mpi() {
         "${run[@]}" -n $ranks "$RELT" render "$scene" "${job[@]}" --threads 1 -o ranks.exr >ranks.$ranks.log 2>&1
         holds "$ranks ranks: the bits of one process ($(grep -o 'rank 0 spent.*' ranks.$ranks.log))" equal ranks.exr
     done
+    # more ranks than the eight blocks of this job: some share one, each with replicas of the same ladder
+    local long=(-D res=32 --mpp 100 --replicas 64 --mapping unidirectional --seed 5)
+    mv alone.exr short.exr
+    "$RELT" render "$scene" "${long[@]}" -o alone.exr >long.log 2>&1
+    "${run[@]}" -n 12 "$RELT" render "$scene" "${long[@]}" --threads 1 -o long.exr >ranks.12.log 2>&1
+    holds "replicas of a ladder on two ranks (12 of them): the bits of one process ($(grep -o 'rank 0 spent.*' ranks.12.log))" \
+        equal long.exr
+    mv short.exr alone.exr
     "${run[@]}" -n 1 nice -n 19 "$RELT" render "$scene" "${job[@]}" --threads 1 -o slow.exr : \
         -n 1 "$RELT" render "$scene" "${job[@]}" --threads 2 -o slow.exr >slow.log 2>&1
     holds "ranks of different speed and threads: the same bits" equal slow.exr
@@ -202,8 +213,48 @@ mpi() {
     say "        mpirun says: $(grep -m1 -i "signal 9" killed.log)"
     "${run[@]}" -n 3 "$RELT" render "$scene" "${job[@]}" --threads 1 "${CHECK[@]}" -o killed.exr >again.log 2>&1
     holds "a rank killed with kill -9, gone on with on 3 ranks: the same bits" eval 'equal killed.exr && went_on again.log'
-    "${run[@]}" -n 2 "$RELT" render "$scene" --method mlt -o mlt.exr >mlt.log 2>&1
-    holds "what cannot be shared is refused, and no rank waits for ever" eval '! [ -e mlt.exr ] && grep -q "runs on one rank only" mlt.log'
+    local mlt=(-D res=48 --mpp 300 --method mlt --mapping unidirectional --seed 5)
+    "$RELT" render "$scene" "${mlt[@]}" -o alone.exr >alone.log 2>&1
+    "${run[@]}" -n 3 "$RELT" render "$scene" "${mlt[@]}" --threads 1 -o mlt.exr >mlt.log 2>&1
+    holds "mlt on 3 ranks: the bits of one process" eval 'grep -q "on 3 ranks" mlt.log && equal mlt.exr'
+    cp ../whole.exr alone.exr
+    "${run[@]}" -n 3 "$RELT" render "$scene" "${job[@]}" --parts $parts --threads 1 -o parts.exr >parts.log 2>&1
+    holds "--parts $parts on 3 ranks: the bits of --parts $parts" eval 'grep -q "on 3 ranks" parts.log && equal parts.exr'
+    cd "$scratch"
+}
+
+# Two hosts that are network namespaces, with a wire between them.
+network() {
+    folder network
+    command -v mpirun >/dev/null || { say "skipped: no mpirun"; return; }
+    local a=relt-a.$$ b=relt-b.$$ refused
+    refused=$(ip netns add $a 2>&1 && ip netns add $b 2>&1) || { say "skipped: no network namespaces: $refused"; return; }
+    hosts+=($a $b)
+    ip link add wire netns $a type veth peer name wire netns $b || { say "skipped: no veth"; return; }
+    ip -n $a addr add 10.9.0.1/24 dev wire; ip -n $b addr add 10.9.0.2/24 dev wire
+    local host; for host in $a $b; do ip -n $host link set lo up; ip -n $host link set wire up; done
+    # in the place of ssh: AGENT HOST COMMAND…
+    printf '#!/bin/bash\nshift\nexec ip netns exec %s unshare --uts bash -c "hostname relt-b; $*"\n' $b >agent
+    chmod +x agent
+    local run=(mpirun --allow-run-as-root --oversubscribe --bind-to none --mca plm_rsh_agent "$PWD/agent" --mca btl tcp,self
+        --mca btl_tcp_if_include 10.9.0.0/24 --mca oob_tcp_if_include 10.9.0.0/24 --mca oob_tcp_keepalive_time 2
+        --mca oob_tcp_keepalive_intvl 1 --mca oob_tcp_keepalive_probes 3 --host 10.9.0.1,10.9.0.2 -n 2
+        "$RELT" render "$scene" "${job[@]}" --threads 1 --checkpoint 1s --resume auto -o cut.exr)
+    on_two_hosts() { ip netns exec $a unshare --uts bash -c 'hostname relt-a; exec "$@"' bash "${run[@]}"; }
+    on_two_hosts >cut.log 2>&1 &
+    local pid=$!
+    await [ -e cut.checkpoint ] || { say "skipped: see cut.log"; return; }
+    ip -n $a link set wire down
+    local begin=$SECONDS
+    wait $pid
+    local code=$?
+    say "        mpirun ends after $((SECONDS - begin)) s with $code: $(grep -m1 -i "lost communication" cut.log)"
+    holds "the wire between two hosts is cut: both ends stop" eval '[ $code != 0 ] && ! [ -e cut.exr ] && await none_rendering'
+    ip -n $a link set wire up
+    on_two_hosts >again.log 2>&1
+    "$RELT" render "$scene" "${job[@]}" -o alone.exr >alone.log 2>&1
+    holds "mended, the same command goes on: the bits of one process" eval \
+        '"$RELT" compare --reference alone.exr cut.exr 2>&1 | grep -q "^cut.exr *0 *0 *0 *1.0000 *0.0000" && went_on again.log'
     cd "$scratch"
 }
 
@@ -265,7 +316,7 @@ faults() {
 
 cd "$scratch" || exit 1
 "$RELT" render "$scene" "${job[@]}" --parts $parts -o whole.exr >whole.log 2>&1 || { cat whole.log; exit 1; }
-for what in "${@:-hyperqueue slurm mpi faults}"; do
+for what in "${@:-hyperqueue slurm mpi network faults}"; do
     for one in $what; do "$one"; done
 done
 exit $failed

@@ -117,7 +117,8 @@ fn block<T: Target>(
         let mut block = Block::new(rng, (0, LADDERS), 5, 2, lanes_a_part, stage.layers.count, [16, 1]);
         block.start(target, &starts);
         block.advance(target, 20, &canvas, round);
-        block.set_offers(rng, 3);
+        block.deposit(&canvas);
+        block.set_offers(3);
         block.advance(target, 20, &canvas, round);
         block.flush(&canvas, round);
         block.deposit(&canvas);
@@ -125,8 +126,6 @@ fn block<T: Target>(
         block.add_histograms(&mut histograms);
         let mut counts = vec![RungCounts::default(); 5];
         block.add_counts(&mut counts);
-        // sums of floats over parts, for reports only, depend on how parts are cut
-        counts.iter_mut().for_each(|c| (c.halves, c.luminance) = ([[0.0; 2]; 2], 0.0));
         let film = (0..stage.layers.count).flat_map(|layer| stage.film.layer(layer)).collect();
         (film, histograms, counts, [block.trips().round_trips, block.trips().restarts])
     })

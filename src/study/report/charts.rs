@@ -217,11 +217,11 @@ fn whisker_chart(
     chart(scene, what, words, size, &panel)
 }
 
-/// Speed and error by threads, or error and round trips by replicas.
+/// Speed and error by threads, ranks or parts, or error and round trips by replicas.
 pub fn scaling(styles: &Styles, scene: &SceneSummary, number: usize, scaling: &Scaling) -> Vec<Chart> {
     let charts = match scaling.varied {
-        Varied::Threads => [speed_by_threads(scene, number, scaling), error_by(styles, scene, number, scaling)],
         Varied::Replicas => [error_by(styles, scene, number, scaling), trips_by_replicas(scene, number, scaling)],
+        _ => [speed_by(scene, number, scaling), error_by(styles, scene, number, scaling)],
     };
     charts.into_iter().flatten().collect()
 }
@@ -239,19 +239,21 @@ fn spreads(scaling: &Scaling, of: impl Fn(&Row) -> Option<Spread>) -> Vec<(f64, 
 
 fn number_axis(scaling: &Scaling) -> Axis {
     let numbers: Vec<usize> = scaling.rows.iter().map(|row| row.number).collect();
-    Axis::log_at(if scaling.varied == Varied::Threads { "threads" } else { "replicas K" }, &numbers)
+    Axis::log_at(if scaling.varied == Varied::Replicas { "replicas K" } else { scaling.varied.option() }, &numbers)
 }
 
-fn speed_by_threads(scene: &SceneSummary, number: usize, scaling: &Scaling) -> Option<Chart> {
+fn speed_by(scene: &SceneSummary, number: usize, scaling: &Scaling) -> Option<Chart> {
     let measured: Vec<(f64, Spread)> = spreads(scaling, |row| row.speed);
     let (fewest, first) = *measured.first()?;
-    let ideal = measured.iter().map(|(threads, _)| [*threads, first.median * threads / fewest]);
+    let more = |workers: f64| if scaling.varied.is_of_workers() { workers / fewest } else { 1.0 };
+    let ideal = measured.iter().map(|(workers, _)| [*workers, first.median * more(*workers)]);
     let values = measured.iter().flat_map(|(_, speed)| [speed.low, speed.high]).chain(ideal.clone().map(|at| at[1]));
     let y = Axis::log("mutations per second", values.collect::<Vec<_>>().into_iter());
-    let mut all = vec![series("as many times the first", Style::guide(), Marks::Lines, ideal)];
+    let like = if scaling.varied.is_of_workers() { "as many times the first" } else { "like the first" };
+    let mut all = vec![series(like, Style::guide(), Marks::Lines, ideal)];
     all.extend(spread_series("measured", Style::numbered(0), &measured));
-    let title = format!("{}: speed by threads", scene.scene.name);
-    let what = format!("threads-{}-speed", number + 1);
+    let title = format!("{}: speed by {}", scene.scene.name, scaling.varied.option());
+    let what = format!("{}-{}-speed", scaling.varied.option(), number + 1);
     let panel = Panel { title: title.clone(), x: number_axis(scaling), y, series: all };
     Some(chart(scene, &what, title, SIZE, &panel))
 }

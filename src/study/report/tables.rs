@@ -6,7 +6,7 @@ use super::figures::{
 };
 use crate::render::progress::significant;
 use crate::study::results::Stage;
-use crate::study::statistics::scaling::{Ladder, Scaling, Varied};
+use crate::study::statistics::scaling::{Ladder, Scaling};
 use crate::study::statistics::{Brightness, MethodSummary, SceneSummary, Spread};
 
 /// Why a brightness is flagged.
@@ -227,9 +227,9 @@ pub fn ladders(scene: &SceneSummary) -> Option<Table> {
     })
 }
 
-/// What changes with threads or replicas.
+/// What changes with threads, ranks, parts or replicas.
 pub fn scaling(scene: &SceneSummary, scaling: &Scaling) -> Table {
-    let threads = scaling.varied == Varied::Threads;
+    let workers = scaling.varied.is_of_workers();
     let laddered = scaling.rows.iter().any(|row| row.ladder.is_some());
     let rows = scaling.rows.iter().map(|row| {
         let mut cells: Vec<Cell> = vec![
@@ -237,7 +237,7 @@ pub fn scaling(scene: &SceneSummary, scaling: &Scaling) -> Table {
             number(row.speed.map(|speed| speed.median * 1e-6)).into(),
             row.speed_up.map_or(UNKNOWN.into(), |speed_up| format!("{}×", significant(speed_up, 3))).into(),
         ];
-        if threads {
+        if workers {
             cells.push(percent(row.parallel_efficiency).into());
         }
         cells.extend([
@@ -262,9 +262,9 @@ pub fn scaling(scene: &SceneSummary, scaling: &Scaling) -> Table {
     });
     let mut rows: Vec<Vec<Cell>> = rows.collect();
     let errors: Vec<_> = scaling.rows.iter().map(|row| row.equal_time_error.map(|error| error.median)).collect();
-    mark_best(&mut rows, if threads { 4 } else { 3 }, &errors, false);
+    mark_best(&mut rows, if workers { 4 } else { 3 }, &errors, false);
     let mut head = vec![scaling.varied.option().to_owned(), "M mut./s".into(), "speed-up".into()];
-    head.extend(threads.then(|| "parallel eff.".into()));
+    head.extend(workers.then(|| "parallel eff.".into()));
     head.extend([
         format!("√relMSE at {}", short_with(scene.equal_time, "s")),
         "at the end".into(),

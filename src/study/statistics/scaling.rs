@@ -1,4 +1,4 @@
-//! What changes with the number of threads, and with the number of replicas.
+//! What changes with the number of threads, of ranks, of parts, and of replicas.
 
 use super::compare::{efficiencies, end_error, speeds};
 use super::curves::{Against, Curve, spread_at};
@@ -10,18 +10,29 @@ use crate::study::results::{LadderEnd, MethodResults, Run, SceneResults};
 pub enum Varied {
     /// Worker threads.
     Threads,
+    /// Processes that share a run.
+    Ranks,
+    /// Parts of a job.
+    Parts,
     /// Replicas a ladder, K.
     Replicas,
 }
 
 impl Varied {
-    /// Both.
-    pub const ALL: [Varied; 2] = [Varied::Threads, Varied::Replicas];
+    /// All.
+    pub const ALL: [Varied; 4] = [Varied::Threads, Varied::Ranks, Varied::Parts, Varied::Replicas];
+
+    /// Whether it is a number of those who work side by side.
+    pub fn is_of_workers(self) -> bool {
+        matches!(self, Varied::Threads | Varied::Ranks)
+    }
 
     /// The option that varies it, without dashes.
     pub fn option(self) -> &'static str {
         match self {
             Varied::Threads => "threads",
+            Varied::Ranks => "ranks",
+            Varied::Parts => "parts",
             Varied::Replicas => "replicas",
         }
     }
@@ -30,6 +41,7 @@ impl Varied {
         let run = method.runs.first()?;
         match self {
             Varied::Threads => Some(run.threads),
+            Varied::Ranks | Varied::Parts => option(method, self.option())?.parse().ok(),
             Varied::Replicas => {
                 let ladders = method.runs.iter().find_map(|run| run.ladder.as_ref());
                 ladders.map(|ladder| ladder.replicas).or_else(|| option(method, "replicas")?.parse().ok())
@@ -67,7 +79,7 @@ pub struct Scaling {
 /// A method of a [`Scaling`]. Numbers of runs are medians over them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Threads or replicas.
+    /// Of what is varied.
     pub number: usize,
     /// Name of the method.
     pub method: String,
@@ -75,7 +87,7 @@ pub struct Row {
     pub speed: Option<Spread>,
     /// [`speed`](Row::speed) over that of the first row.
     pub speed_up: Option<f64>,
-    /// Speed-up over the quotient of threads: 1 where every thread is worth as much as the first. Of threads only.
+    /// Speed-up over the quotient of workers: 1 where every one is worth as much as the first. Of threads and ranks only.
     pub parallel_efficiency: Option<f64>,
     /// √relMSE at the end.
     pub end_error: Option<Spread>,
@@ -166,7 +178,7 @@ fn rows(varied: Varied, methods: &[(usize, &MethodResults)], equal_time: Option<
             speed,
             speed_up,
             parallel_efficiency: speed_up
-                .filter(|_| varied == Varied::Threads)
+                .filter(|_| varied.is_of_workers())
                 .map(|speed_up| speed_up * fewest as f64 / *number as f64),
             end_error: end_error(runs),
             equal_time_error: equal_time.and_then(|time| spread_at(&curves, time)),

@@ -37,6 +37,7 @@ use crate::{
     chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target, TechniqueChanges},
     film::{Accumulator, Footprint},
     path::Faults,
+    ranks::Group,
     rng::Rng,
 };
 
@@ -321,6 +322,7 @@ impl<W: Default + Send> Sampler<W> {
         assert!(self.screen.elsewhere || !target.splats_elsewhere(), "no layers for what points contribute elsewhere");
         let learning = self.learning();
         let until = until.unwrap_or(u64::MAX);
+        self.take_up_own();
         let mut gone = 0;
         while gone < sweeps && self.state.evaluations < until && self.sweeps_left() != Some(0) {
             if self.state.schedule.done == self.state.schedule.length {
@@ -355,7 +357,13 @@ impl<W: Default + Send> Sampler<W> {
             false => Use::Image,
         };
         let half = usize::from(schedule.done >= schedule.middle());
-        self.portions[own.clone()].par_iter_mut().for_each(|portion| {
+        let (group, alone) = (self.partners(), Group::alone());
+        // what chains start from is put in its order by one rank of those that share a block
+        let of_points = match (keeps, group.is_first()) {
+            (true, first) => first.then_some(&alone),
+            (false, _) => Some(&group),
+        };
+        let work = |portion: &mut Portion<W>| {
             let canvas = screen.canvas();
             let Portion { uniform, tally, ladders, starts, .. } = portion;
             for _ in 0..sweeps {
@@ -367,16 +375,21 @@ impl<W: Default + Send> Sampler<W> {
                         starts.push(start);
                     }
                 };
-                uniform.sweep(target, (schedule.points, purpose), &canvas, round, tally, keep);
+                uniform.sweep(target, (schedule.points, purpose, of_points), &canvas, round, tally, keep);
             }
             uniform.settle(&canvas, tally);
             tally.deposit(&canvas, half, None);
             if let Some(block) = ladders {
                 block.deposit(&canvas);
             }
-        });
+        };
+        match &mut self.portions[own.clone()] {
+            // on this very thread, which then may wait for others that share it
+            [portion] => work(portion),
+            portions => portions.par_iter_mut().for_each(work),
+        }
         let drawn = sweeps * (self.portions.len() * self.state.schedule.points) as u64;
-        let drawn_here = sweeps * (own.len() * self.state.schedule.points) as u64;
+        let drawn_here = if group.is_first() { sweeps * (own.len() * self.state.schedule.points) as u64 } else { 0 };
         let mut uniform_rays = 0;
         for portion in &mut self.portions[own] {
             let (uniform, faults) = portion.uniform.take_rays_and_faults();

@@ -96,7 +96,7 @@ impl<W: Default + Send> Sampler<W> {
         }
         // tempered luminance is in units of the weights, whose normalisers are only now known
         let scale = libm::exp(learnt.normalisers.target.ln_value - self.state.ln_unit);
-        let luminance = |k: usize| counts[k].luminance * if k == 0 { 1.0 } else { scale };
+        let luminance = |k: usize| counts[k].luminance.values().0 * if k == 0 { 1.0 } else { scale };
         let all: f64 = (0..counts.len()).map(luminance).sum();
         (0..counts.len())
             .map(|k| {
@@ -161,7 +161,7 @@ impl<W: Default + Send> Sampler<W> {
         for block in self.portions.iter().filter_map(|portion| portion.ladders.as_ref()) {
             let mut counts = vec![RungCounts::default(); rungs];
             block.add_counts(&mut counts);
-            means.extend(counts[top].halves.iter().filter(|half| half[1] > 0.0).map(|half| half[0] / half[1]));
+            means.extend(counts[top].halves.iter().filter_map(|half| half.mean()));
             let mut histograms = vec![crate::tempering::Histogram::default(); rungs];
             block.add_histograms(&mut histograms);
             within.merge(&histograms[top]);

@@ -75,6 +75,7 @@ impl<W: Default + Send> Sampler<W> {
         self.exchange();
         self.conclude_round(target);
         self.keep_own();
+        self.forget_what_is_told();
     }
 
     /// What follows from the round at work, with all that was seen in it at hand.
@@ -214,7 +215,7 @@ impl<W: Default + Send> Sampler<W> {
             .collect();
         let (rng, layers, offers, size) = (self.rng, self.screen.layers.count, self.state.offers, self.screen.size);
         let importance = self.importance.as_ref();
-        let own = self.own();
+        let (own, group) = (self.own(), self.partners());
         self.portions.par_iter_mut().enumerate().for_each(|(i, portion)| {
             let first = i * ladders;
             let starts: Vec<&[Start]> = starts.iter().map(|rung| &rung[first..first + ladders]).collect();
@@ -222,6 +223,7 @@ impl<W: Default + Send> Sampler<W> {
             block.set_importance(importance);
             // what others work on they start themselves
             if own.contains(&i) {
+                block.share(&group);
                 block.start(target, &starts);
             }
             portion.ladders = Some(block);
@@ -275,8 +277,8 @@ impl<W: Default + Send> Sampler<W> {
             let accepted = counts[1].swaps.acceptance();
             let most = self.uniform_a_ladder(self.state.round.ladder.chains()).floor().max(1.0);
             self.state.offers = (OFFERS_TAKEN / accepted.max(1e-9)).ceil().min(most) as usize;
-            let (rng, offers) = (self.rng, self.state.offers);
-            self.portions.iter_mut().flat_map(|p| &mut p.ladders).for_each(|block| block.set_offers(rng, offers));
+            let offers = self.state.offers;
+            self.portions.iter_mut().flat_map(|p| &mut p.ladders).for_each(|block| block.set_offers(offers));
         }
         if last || self.state.choice.ratio == 0.0 {
             self.state.schedule.frozen = true;

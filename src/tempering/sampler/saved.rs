@@ -11,6 +11,7 @@ use super::{Portion, Sampler, Setup, State, most_rungs, rounds::LANES_A_PART};
 use crate::{
     chain::{Importance, Start},
     film::Accumulator,
+    ranks::Group,
     rng::Purpose,
     saved::{Source, Unfit, expect, write_value},
     tempering::{Block, Histogram, Layers, PointGroups, Probes, SavedBlock, SavedTally, Seen, Sum},
@@ -82,7 +83,7 @@ impl<W: Default + Send> Sampler<W> {
         sampler.importance = saved.importance.map(Arc::new);
         sampler.state = saved.state;
         for number in 0..sampler.portions.len() {
-            sampler.restore_portion(number, from.value()?)?;
+            sampler.restore_portion(number, from.value()?, &Group::alone())?;
         }
         expect(sampler.a_sweep() > 0 && sampler.state.schedule.done <= sampler.state.schedule.length, "schedule")?;
         sampler.screen.film.restore(from)?;
@@ -90,8 +91,8 @@ impl<W: Default + Send> Sampler<W> {
         Ok(sampler)
     }
 
-    /// Puts a portion where it was saved.
-    pub(super) fn restore_portion(&mut self, number: usize, saved: SavedPortion) -> Result<(), Unfit> {
+    /// Puts a portion where it was saved: what a rank has of it that shares it with a group.
+    pub(super) fn restore_portion(&mut self, number: usize, saved: SavedPortion, group: &Group) -> Result<(), Unfit> {
         let (rng, size, layers) = (self.rng, self.screen.size, self.screen.prepared.count);
         let rungs = self.state.round.ladder.rungs();
         let Portion { uniform, tally, ladders, past, added, starts } = &mut self.portions[number];
@@ -111,6 +112,7 @@ impl<W: Default + Send> Sampler<W> {
                 size,
             );
             block.set_importance(self.importance.as_ref());
+            block.share(group);
             block.restore(saved)?;
             *ladders = Some(block);
         }
@@ -120,6 +122,16 @@ impl<W: Default + Send> Sampler<W> {
         expect(saved.starts.iter().all(on_film), "starts")?;
         (*past, *added, *starts) = (saved.past, saved.added, saved.starts);
         Ok(())
+    }
+}
+
+impl SavedPortion {
+    /// Adds what the next of the ranks that share it has of it.
+    pub(super) fn join(&mut self, next: SavedPortion) {
+        self.tally.merge(&next.tally);
+        if let (Some(block), Some(next)) = (&mut self.ladders, next.ladders) {
+            block.join(next);
+        }
     }
 }
 

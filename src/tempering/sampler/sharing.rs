@@ -1,12 +1,17 @@
 //! One sampler on several ranks: each works on blocks of its own, and all learn the same.
 //!
-//! Between ends of rounds a rank's blocks need nobody. At the end of a round everyone is told what all blocks saw (counts
+//! Between ends of rounds a rank's blocks need nobody; where there are more ranks than blocks, several share one and talk in
+//! every sweep (see [`Block`]). At the end of a round everyone is told what all blocks saw (counts
 //! and histograms, never where chains are), and draws the same conclusions from it. What is summed over all blocks (film,
 //! probes, stratified points, rays) is in two places meanwhile: the first rank has what there was, the others what they
 //! have added since they last gave it away. All of it are integers, so the sum of all ranks is that of one process, bit by
 //! bit. Chains travel only to be saved or shown, to the first rank.
 
-use std::{ops::Range, sync::Arc};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    ops::Range,
+    sync::Arc,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -14,15 +19,19 @@ use super::{Portion, Sampler, Screen, saved::SavedPortion};
 use crate::{
     film::Accumulator,
     path::Faults,
-    ranks::Company,
+    ranks::{Company, Group},
     saved::{Source, Unfit},
-    tempering::{BlockStatistics, Histogram, PointGroups, Probes, SavedTally, Seen, Sum},
+    tempering::{Block, BlockStatistics, Histogram, PointGroups, Probes, SavedTally, Seen, Sum},
 };
 
 /// The other ranks, and which blocks are this one's.
 pub(super) struct Share {
     company: Arc<Company>,
     own: Range<usize>,
+    /// Those that share its only block with it.
+    group: Group,
+    /// What the first rank has of that block, while it has the whole to show.
+    aside: Option<SavedPortion>,
 }
 
 /// What a rank adds to the sums over all blocks.
@@ -48,14 +57,18 @@ struct Statistics {
 impl<W: Default + Send> Sampler<W> {
     /// Shares the work with those ranks, who all have the same sampler now.
     pub fn share(&mut self, company: Arc<Company>) {
-        let of = |rank: usize| self.portions.len() * rank / company.count();
-        let own = of(company.number())..of(company.number() + 1);
+        let own = company.own(self.portions.len());
+        let group = company.group(own.start, self.portions.len());
         if !company.is_first() {
             let Screen { size, prepared, unit, .. } = &self.screen;
             self.screen.film = Accumulator::new(size[0], size[1], prepared.count, *unit);
         }
-        self.share = Some(Share { company, own });
+        if !group.is_alone() {
+            self.portions[own.start].ladders.iter_mut().for_each(|block| block.share(&group));
+        }
+        self.share = Some(Share { company, own, group, aside: None });
         self.keep_own();
+        self.forget_what_is_told();
     }
 
     /// The blocks that are worked on here: all, unless the work is shared.
@@ -63,9 +76,24 @@ impl<W: Default + Send> Sampler<W> {
         self.share.as_ref().map_or(0..self.portions.len(), |share| share.own.clone())
     }
 
+    /// The ranks that share what is worked on here.
+    pub(super) fn partners(&self) -> Group {
+        self.share.as_ref().map_or_else(Group::alone, |share| share.group.clone())
+    }
+
+    /// Goes on with what is this rank's of a block that it had the whole of, to show it.
+    pub(super) fn take_up_own(&mut self) {
+        let Some(share) = &mut self.share else { return };
+        let (own, group) = (share.own.start, share.group.clone());
+        if let Some(aside) = share.aside.take() {
+            self.restore_portion(own, aside, &group).expect("its own state");
+        }
+    }
+
     /// Brings all sums and all chains to the first rank, which then has what a process alone would have, to save it or to show
     /// it. All ranks must call this after the same sweeps; does nothing where the work is not shared.
     pub fn gather(&mut self) {
+        self.take_up_own();
         let Some(share) = &self.share else { return };
         let company = share.company.clone();
         let own: Vec<SavedPortion> = self.portions[share.own.clone()].iter().map(Portion::saved).collect();
@@ -80,18 +108,37 @@ impl<W: Default + Send> Sampler<W> {
         self.gather_film(&company);
         self.gather_probes(&company);
         if company.is_first() {
-            for (i, bytes) in all.iter().enumerate() {
-                let (first, portions, added): (usize, Vec<SavedPortion>, Added) =
-                    postcard::from_bytes(bytes).expect("what a rank told");
-                if i > 0 {
-                    self.add(added);
-                    for (number, saved) in (first..).zip(portions) {
-                        self.restore_portion(number, saved).expect("what a rank of the same run told");
-                    }
+            self.take_all(&all);
+        }
+        self.keep_own();
+    }
+
+    /// Takes what all ranks have, each in a message of its own, the first of which is this one's.
+    fn take_all(&mut self, all: &[Vec<u8>]) {
+        let mut whole: BTreeMap<usize, SavedPortion> = BTreeMap::new();
+        for (rank, bytes) in all.iter().enumerate() {
+            let (first, portions, added): (usize, Vec<SavedPortion>, Added) =
+                postcard::from_bytes(bytes).expect("what a rank told");
+            if rank > 0 {
+                self.add(added);
+            }
+            for (number, saved) in (first..).zip(portions) {
+                match whole.entry(number) {
+                    Entry::Vacant(place) => drop(place.insert(saved)),
+                    Entry::Occupied(place) => place.into_mut().join(saved),
                 }
             }
         }
-        self.keep_own();
+        let Share { own, group, aside, .. } = self.share.as_mut().expect("others that told");
+        let own = own.clone();
+        if group.is_alone() {
+            whole.retain(|number, _| !own.contains(number));
+        } else {
+            *aside = Some(self.portions[own.start].saved());
+        }
+        for (number, saved) in whole {
+            self.restore_portion(number, saved, &Group::alone()).expect("what a rank of the same run told");
+        }
     }
 
     /// Tells everyone what all blocks saw. Until [`keep_own`](Self::keep_own) all ranks have all sums, but for the film.
@@ -101,12 +148,17 @@ impl<W: Default + Send> Sampler<W> {
         let own: Vec<Statistics> = self.portions[share.own.clone()].iter().map(Portion::statistics).collect();
         let told = company.everywhere(&(share.own.start, own, self.added()));
         for (rank, (first, portions, added)) in told.into_iter().enumerate() {
-            if rank == company.number() {
-                continue;
+            if rank != company.number() {
+                self.add(added);
             }
-            self.add(added);
-            for (portion, statistics) in self.portions[first..].iter_mut().zip(portions) {
-                portion.learn(statistics).expect("what a rank of the same run told");
+            for (number, told) in (first..).zip(portions) {
+                let ranks = company.ranks_at(number, self.portions.len());
+                let portion = &mut self.portions[number];
+                let learnt = match rank == ranks.start {
+                    true => portion.learn(told),
+                    false => portion.learn_more(told),
+                };
+                learnt.expect("what a rank of the same run told");
             }
         }
         self.gather_probes(&company);
@@ -135,6 +187,16 @@ impl<W: Default + Send> Sampler<W> {
         }
         let state = &mut self.state;
         (state.rays, state.ladder_rays, state.first_rays, state.faults) = (0, 0, [[0; 2]; 2], Faults::default());
+    }
+
+    /// What was seen of a block that is shared is the first's of the group, once all have been told.
+    pub(super) fn forget_what_is_told(&mut self) {
+        if let Some(Share { own, group, .. }) = self.share.as_ref().filter(|share| !share.group.is_first()) {
+            debug_assert!(!group.is_alone());
+            let Portion { tally, ladders, .. } = &mut self.portions[own.start];
+            tally.forget();
+            ladders.iter_mut().for_each(Block::forget);
+        }
     }
 
     /// What the first rank finds with the whole film, for everyone.
@@ -169,22 +231,13 @@ impl<W: Default + Send> Sampler<W> {
         state.faults.merge(&added.faults);
     }
 
-    /// Adds up the film at the first rank; what the others have is then of no more use.
+    /// Adds up the film at the first rank.
     fn gather_film(&mut self, company: &Company) {
-        let screen = &self.screen;
-        let empty = || Accumulator::new(screen.size[0], screen.size[1], screen.prepared.count, screen.unit);
-        let add = |film: &mut &Accumulator, bytes: &[u8]| {
-            let mut other = empty();
-            other.restore(&mut source(bytes)).expect("what a rank of the same run told");
-            film.merge(&other);
-        };
-        company.fold(&mut &screen.film, |film| saved(|bytes| film.save(bytes)), add);
-        if !company.is_first() {
-            self.screen.film = empty();
-        }
+        let Screen { size, prepared, unit, film, .. } = &mut self.screen;
+        company.gather_film(film, || Accumulator::new(size[0], size[1], prepared.count, *unit));
     }
 
-    /// The same with the probes, where there are any.
+    /// Adds up the probes at the first rank, where there are any; the others keep theirs.
     fn gather_probes(&self, company: &Company) {
         let screen = &self.screen;
         let Some(probes) = &screen.probes else { return };
@@ -202,7 +255,7 @@ impl<W: Default + Send> Portion<W> {
     fn statistics(&self) -> Statistics {
         Statistics {
             tally: self.tally.saved(),
-            ladders: self.ladders.as_ref().map(crate::tempering::Block::statistics),
+            ladders: self.ladders.as_ref().map(Block::statistics),
             past: self.past.clone(),
             added: self.added,
             starts: self.starts.clone(),
@@ -217,6 +270,17 @@ impl<W: Default + Send> Portion<W> {
         }
         (self.past, self.added, self.starts) = (told.past, told.added, told.starts);
         Ok(())
+    }
+
+    /// Adds what another rank saw that shares the portion.
+    fn learn_more(&mut self, told: Statistics) -> Result<(), Unfit> {
+        let mut seen = self.tally.saved();
+        seen.merge(&told.tally);
+        self.tally.restore(seen)?;
+        match (&mut self.ladders, told.ladders) {
+            (Some(block), Some(statistics)) => block.add_statistics(statistics),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -282,11 +346,18 @@ mod tests {
         saved(|bytes| sampler.save(bytes))
     }
 
-    /// Through all phases, brought together amid a round and at the end, with more ranks than divide the blocks evenly: the
-    /// first rank has all that a run alone has, chains, sums and film, bit by bit.
+    /// Through all phases, brought together amid a round and at the end, with numbers of ranks that do not divide the eight
+    /// blocks evenly or are more, so that replicas of one ladder live on two ranks or three: the first rank has all that a run
+    /// alone has, chains, sums and film, bit by bit.
     #[test]
     fn ranks_come_to_the_bits_of_one_process() {
-        for ladder in [LadderChoice::Auto, LadderChoice::Replicas(4), LadderChoice::Replicas(1)] {
+        let cases = [
+            (LadderChoice::Auto, [3, 11]),
+            (LadderChoice::Replicas(4), [5, 11]),
+            (LadderChoice::Replicas(1), [2, 11]),
+            (LadderChoice::Replicas(40), [2, 20]),
+        ];
+        for (ladder, counts) in cases {
             let mut alone = sampler(ladder.clone());
             let mut states = Vec::new();
             for until in [1 << 15, (1 << 18) + 77, u64::MAX] {
@@ -295,7 +366,7 @@ mod tests {
                 }
                 states.push(state(&alone));
             }
-            for count in [2, 3, 5] {
+            for count in counts {
                 let shared = together(count, |company| {
                     let mut own = sampler(ladder.clone());
                     own.share(company);
