@@ -26,14 +26,15 @@ seeds() {
     done
 }
 
-# A small run of each method, stopped where its checkpoint is written.
+# A small run of each method, stopped where its checkpoint is written; by the program RELT where that is given.
 checkpoints() {
-    local made
+    local made relt=(cargo run --quiet --release --manifest-path ../Cargo.toml --)
     made=$(mktemp -d)
+    [ -z "${RELT:-}" ] || relt=("$RELT")
     for method in path mlt re; do
         # without the checksum at the end, which the target adds
-        cargo run --quiet --release --manifest-path ../Cargo.toml -- render ../scenes/cornell-box/scene.xml -D res=4 \
-            --quiet --method $method --mpp 16 --mapping unidirectional --output "$made/$method.exr" \
+        "${relt[@]}" render ../scenes/cornell-box/scene.xml -D res=4 --quiet --method $method --mpp 16 \
+            --mapping unidirectional --output "$made/$method.exr" \
             --checkpoint-file "$made/$method.state" --checkpoint 1ms && head -c -4 "$made/$method.state" >"$made/$method.seed"
     done
     seeds "$made"/*.seed
