@@ -70,9 +70,7 @@ impl Rng {
     /// Four independent uniform words for block `block` of the counter.
     #[inline(always)]
     pub fn words(&self, counter: Counter, block: u16) -> [u32; 4] {
-        let [a, b, c, d] = counter.words(block);
-        let [[a], [b], [c], [d]] = philox([[a], [b], [c], [d]], self.key);
-        [a, b, c, d]
+        philox(counter.words(block).map(|word| [word]), self.key).map(|[word]| word)
     }
 
     /// A seed for another source, independent of all that this one gives: the first two words of the counter.
@@ -134,13 +132,6 @@ fn philox<const N: usize>(mut c: [[u32; N]; 4], mut key: [u32; 2]) -> [[u32; N];
 #[inline(always)]
 pub fn unit_f32(word: u32) -> f32 {
     (word >> 8) as f32 * (1.0 / 16_777_216.0)
-}
-
-/// [`unit_f32`] of four words. (Not `words.map(unit_f32)`: what the standard library's arrays call is a call in loops
-/// that are made for wider instructions.)
-#[inline(always)]
-pub fn units_f32([a, b, c, d]: [u32; 4]) -> [f32; 4] {
-    [unit_f32(a), unit_f32(b), unit_f32(c), unit_f32(d)]
 }
 
 /// A word for which [`unit_f32`] is the nearest to `u`, a number in [0, 1]; the rest of the word is that of `rest`.

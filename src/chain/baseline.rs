@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, decisions::draw_decisions, replay};
+use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
 use crate::{
     path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -50,8 +50,6 @@ pub struct Baseline<W> {
     large_steps: LargeSteps,
     /// Uniform number of each lane's decision at this step.
     decisions: Vec<f64>,
-    /// All words that decide on a step, while one is prepared.
-    words: Vec<[u32; 4]>,
     steps: u64,
     /// Steps in a row that each chain refused, and the most that were.
     refused: Vec<u32>,
@@ -124,7 +122,6 @@ impl<W: Default> Baseline<W> {
             evaluator,
             large_steps,
             decisions,
-            words: Vec::new(),
             steps,
             refused,
             longest_rejection,
@@ -157,7 +154,6 @@ impl<W: Default> Baseline<W> {
             walkers,
             evaluator,
             large_steps,
-            words: Vec::new(),
             decisions: vec![0.0; starts.len()],
             refused: vec![0; starts.len()],
             longest_rejection: 0,
@@ -188,9 +184,9 @@ impl<W: Default> Baseline<W> {
         if target.changes_techniques() {
             self.change_techniques(target, unit, recorder);
         }
-        draw_decisions(rng, &self.evaluator.counters, &mut self.words);
-        for (lane, words) in self.words.iter().enumerate() {
-            let [decision, kind] = [open_unit_f64(words[0]), open_unit_f64(words[1])];
+        for lane in 0..self.decisions.len() {
+            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[lane] };
+            let [decision, kind, ..] = rng.words(counter, 0).map(open_unit_f64);
             self.decisions[lane] = decision;
             let large = kind < self.large_steps.probability;
             self.evaluator.moves[lane] = if large { Move::Fresh } else { Move::Small(StepLaw::KELEMEN) };

@@ -2,7 +2,6 @@
 
 mod baseline;
 mod changes;
-mod decisions;
 mod importance;
 mod metropolis;
 mod plan;
@@ -13,7 +12,6 @@ mod walkers;
 
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Moments, SavedBaseline, baseline_layer};
 pub use changes::{TECHNIQUE_CHANGES, TechniqueChanges};
-pub(crate) use decisions::draw_decisions;
 pub use importance::{Importance, Measure};
 pub use metropolis::acceptance;
 pub use plan::{FEWEST_BLOCKS, Plan};

@@ -305,11 +305,11 @@ fn closest<A: Copy, const N: usize, const INSTANCES: bool>(
     let (t, t_rest) = hits.t.as_chunks_mut::<N>();
     let (instance, instance_rest) = hits.instance.as_chunks_mut::<N>();
 
-    let (all, mut packet) = (Valid::first(N), RayHit::<A, N>::new());
+    let mut packet = RayHit::<A, N>::new();
     for i in 0..count {
-        packet.ray.load(nth(&packets, i));
+        packet.ray.load(packets.map(|array| array[i]));
         packet.forget_hits::<INSTANCES>();
-        trace(&all, &mut packet);
+        trace(&Valid::first(N), &mut packet);
         geometry[i] = packet.hit.geometry;
         primitive[i] = packet.hit.primitive;
         u[i] = packet.hit.u;
@@ -345,23 +345,17 @@ fn any<A: Copy, const N: usize>(
     let (packets, rest) = rays.packets::<N>();
     let (full, partial) = occluded.as_chunks_mut::<N>();
 
-    let (all, mut packet) = (Valid::first(N), Ray::<A, N>::new());
+    let mut packet = Ray::<A, N>::new();
     for (i, occluded) in full.iter_mut().enumerate() {
-        packet.load(nth(&packets, i));
-        trace(&all, &mut packet);
-        occluded.iter_mut().zip(packet.tfar).for_each(|(occluded, t)| *occluded = t == f32::NEG_INFINITY); // how Embree says so
+        packet.load(packets.map(|array| array[i]));
+        trace(&Valid::first(N), &mut packet);
+        *occluded = packet.tfar.map(|t| t == f32::NEG_INFINITY); // how Embree says so
     }
     if !partial.is_empty() {
         packet.load_partial(rest);
         trace(&Valid::first(partial.len()), &mut packet);
         partial.iter_mut().zip(packet.tfar).for_each(|(occluded, t)| *occluded = t == f32::NEG_INFINITY);
     }
-}
-
-/// Packet `i` of every array.
-#[inline(always)]
-fn nth<const N: usize>([ox, oy, oz, dx, dy, dz, tfar]: &[&[[f32; N]]; 7], i: usize) -> [[f32; N]; 7] {
-    [ox[i], oy[i], oz[i], dx[i], dy[i], dz[i], tfar[i]]
 }
 
 impl<A, const N: usize> Valid<A, N> {

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     embree::{Hits, MISS, Rays},
     math::widest,
-    rng::units_f32,
+    rng::unit_f32,
     sample::Proposals,
     scene::{Profile, Rgb, Scene},
 };
@@ -121,7 +121,7 @@ fn start_at_camera(mapping: &Mapping, proposals: &mut Proposals, w: &mut Arrays)
     w.radiance.resize(proposals.lanes(), Rgb::ZERO);
     w.film.resize(proposals.lanes(), [0.0; 2]);
     for &lane in &w.lanes {
-        let [x, y, u, v] = units_f32(proposals.block(0, lane as usize));
+        let [x, y, u, v] = proposals.block(0, lane as usize).map(unit_f32);
         let ray = mapping.scene().camera.ray([x, y], [u, v]);
         w.film[lane as usize] = [x, y];
         w.rays.push(ray.origin, ray.direction, ray.tfar);

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use super::Layout;
 use crate::{
     math::{Frame, offset_origin},
-    rng::units_f32,
+    rng::unit_f32,
     sample::Block,
     scene::{
         NO_LIGHT, Profile, Rgb, Scene, Surface,
@@ -41,6 +41,12 @@ pub(super) struct Connection {
     pub contribution: Rgb,
 }
 
+impl Connection {
+    /// Stands where there is none.
+    pub const NONE: Connection =
+        Connection { origin: Vec3::ZERO, direction: Vec3::ZERO, tfar: 0.0, contribution: Rgb::ZERO };
+}
+
 /// The next edge of a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
@@ -62,8 +68,8 @@ pub(super) struct Decisions {
 impl Decisions {
     #[inline(always)]
     pub fn new(layout: &Layout, bounce: u16, first: Block, choices: Option<Block>) -> Decisions {
-        let [a, b, c, d] = units_f32(first);
-        let [lobe, light, roulette, _] = units_f32(choices.unwrap_or([0; 4]));
+        let [a, b, c, d] = first.map(unit_f32);
+        let [lobe, light, roulette, _] = choices.unwrap_or([0; 4]).map(unit_f32);
         Decisions {
             direction: [a, b],
             light_place: [c, d],
@@ -76,7 +82,7 @@ impl Decisions {
     /// Of a bounce of a light subpath, with roulette or without.
     #[inline(always)]
     pub fn of_light(layout: &Layout, bounce: u16, block: Block, roulette: bool) -> Decisions {
-        let [a, b, lobe, survival] = units_f32(block);
+        let [a, b, lobe, survival] = block.map(unit_f32);
         Decisions {
             direction: [a, b],
             light_place: [0.0; 2],
@@ -157,20 +163,13 @@ pub(super) fn connected(
     Evaluation { value, pdf }: Evaluation,
     carried: &Carried,
 ) -> Option<Connection> {
-    let (connection, contributes) = connected_anyhow(light, Evaluation { value, pdf }, carried);
-    contributes.then_some(connection)
-}
-
-/// The same and whether it is anything: without a branch, for loops over lanes.
-#[inline(always)]
-pub(super) fn connected_anyhow(
-    light: &LightSample,
-    Evaluation { value, pdf }: Evaluation,
-    carried: &Carried,
-) -> (Connection, bool) {
     let contribution = carried.throughput * value * light.weight * power_heuristic(light.pdf, pdf);
-    let contributes = (contribution.x != 0.0) | (contribution.y != 0.0) | (contribution.z != 0.0);
-    (Connection { origin: light.origin, direction: light.wi, tfar: light.tfar, contribution }, contributes)
+    (contribution != Rgb::ZERO).then_some(Connection {
+        origin: light.origin,
+        direction: light.wi,
+        tfar: light.tfar,
+        contribution,
+    })
 }
 
 /// What survival follows where roulette is played. Ratios of refractive indices do not count: they are no absorption.

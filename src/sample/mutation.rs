@@ -25,11 +25,7 @@ impl StepLaw {
     /// Moves each dimension of `from` by a step of its own, each made from one random word.
     #[inline(always)]
     pub fn step(&self, from: Block, random: [u32; 4]) -> Block {
-        let mut to = from; // a loop and no closure: see `units_f32`
-        for (to, random) in to.iter_mut().zip(random) {
-            *to = to.wrapping_add(self.displacement(random));
-        }
-        to
+        std::array::from_fn(|i| from[i].wrapping_add(self.displacement(random[i])))
     }
 
     /// One signed displacement as an element of the torus: the lowest bit is the sign, the rest the size.

@@ -125,15 +125,13 @@ impl Proposals<'_> {
     /// among all low-discrepancy ones. Each pixel has a sequence of its own for the camera's subpath; light subpaths have
     /// nothing to do with pixels and follow one over the whole film.
     #[inline(always)]
-    fn sequences<const N: usize>(&self, mut counters: [Counter; N], block: u16) -> ([Counter; N], u16) {
+    fn sequences<const N: usize>(&self, counters: [Counter; N], block: u16) -> ([Counter; N], u16) {
         if block < LIGHT_STREAM {
             return (counters, block);
         }
         let pixels = u64::from(self.film[0]) * u64::from(self.film[1]);
-        for c in &mut counters {
-            *c = Counter { ladder: 0, step: c.step * pixels + u64::from(c.ladder), ..*c };
-        }
-        (counters, block - LIGHT_STREAM + LOW_DISCREPANCY_BLOCKS)
+        let of_film = |c: Counter| Counter { ladder: 0, step: c.step * pixels + u64::from(c.ladder), ..c };
+        (counters.map(of_film), block - LIGHT_STREAM + LOW_DISCREPANCY_BLOCKS)
     }
 
     /// Makes the lane's block from four words that are uniform.

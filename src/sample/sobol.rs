@@ -26,9 +26,8 @@ pub const LOW_DISCREPANCY_BLOCKS: u16 = 3;
 #[inline(always)]
 pub fn words(rng: Rng, counter: Counter, block: u16) -> Block {
     let (scramble, number) = scramble_of(counter);
-    let [[a, b, c, d], [e, f, g, h]] = [rng.words(scramble, 2 * block), rng.words(scramble, 2 * block + 1)];
-    let [[a], [b], [c], [d]] = scrambled([number], [[a], [b], [c], [d]], [[e], [f], [g], [h]]);
-    [a, b, c, d]
+    let [addends, others] = [0, 1].map(|part| rng.words(scramble, 2 * block + part).map(|word| [word]));
+    scrambled([number], addends, others).map(|[word]| word)
 }
 
 /// The same for [`SIDE_BY_SIDE`] points at once: word i of point j is at `[i][j]`.

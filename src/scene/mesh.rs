@@ -44,8 +44,7 @@ impl Mesh {
     /// The three corners of triangle `t`.
     #[inline(always)]
     pub fn corners(&self, t: u32) -> [Vec3; 3] {
-        let [a, b, c] = self.triangles[t as usize];
-        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
+        self.triangles[t as usize].map(|i| self.positions[i as usize])
     }
 
     /// Unit shading normal of triangle `t` at barycentric coordinates (1 − u − v, u, v); `flat`, its own normal, where

@@ -13,7 +13,7 @@ use super::{
     trips::{IndexProcess, Trips},
 };
 use crate::{
-    chain::{Evaluator, Importance, Start, Target, Walkers, draw_decisions, replay},
+    chain::{Evaluator, Importance, Start, Target, Walkers, replay},
     path::{Contributions, Faults, Whole},
     ranks::Group,
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -73,8 +73,6 @@ struct Part<W> {
     /// Scale of each replica's step at work, and the random word that will decide on it.
     scale: Vec<u8>,
     decision: Vec<u32>,
-    /// All words that decide on a step, while one is prepared.
-    words: Vec<[u32; 4]>,
 }
 
 /// What ranks that share a block tell after an exploration.
@@ -202,7 +200,6 @@ impl<W: Default + Send> Block<W> {
                 refused: vec![0; own],
                 scale: vec![0; own],
                 decision: vec![0; own],
-                words: Vec::new(),
             }
         };
         // one part at least, for what is seen of swaps
@@ -640,9 +637,10 @@ impl<W: Default> Part<W> {
             self.change_techniques(target, canvas, round, rung);
         }
         self.evaluator.moves[self.replicas..].fill(Move::Fresh);
-        draw_decisions(rng, &self.evaluator.counters[..self.replicas], &mut self.words);
-        for (at, &[decision, choice, ..]) in self.words.iter().enumerate() {
+        for at in 0..self.replicas {
             let k = usize::from(rung[self.first + at]);
+            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
+            let [decision, choice, ..] = rng.words(counter, 0);
             self.decision[at] = decision;
             self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
             self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);

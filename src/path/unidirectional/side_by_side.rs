@@ -21,7 +21,7 @@ use crate::{
     sample::Proposals,
     scene::{
         NO_LIGHT, Profile, Scene,
-        lights::{LightSample, on_face, towards_anyhow},
+        lights::{LightSample, on_face, towards},
         materials::{Diffuse, Material, Scatter},
         on_triangle,
     },
@@ -276,15 +276,16 @@ fn look_at_lights(g: &mut Group) {
             warp::triangle([within, g.chosen_place[1][j]]),
         );
         let normal = g.face_normal.get(j);
-        let (sample, shines) =
-            towards_anyhow(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
-        let light =
-            LightSample { weight: sample.weight / g.probability[j], pdf: sample.pdf * g.probability[j], ..sample };
-        let (frame, wo) = g.seen(j);
-        let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
-        let (connection, contributes) = vertex::connected_anyhow(&light, evaluation, &g.carried(j));
-        g.connected[j] = u32::from(shines & contributes);
-        let Connection { origin, direction, tfar, contribution } = connection;
+        let sample = towards(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
+        let connection = sample.and_then(|sample| {
+            let light =
+                LightSample { weight: sample.weight / g.probability[j], pdf: sample.pdf * g.probability[j], ..sample };
+            let (frame, wo) = g.seen(j);
+            let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
+            vertex::connected(&light, evaluation, &g.carried(j))
+        });
+        g.connected[j] = u32::from(connection.is_some());
+        let Connection { origin, direction, tfar, contribution } = connection.unwrap_or(Connection::NONE);
         g.shadow_origin.set(j, origin);
         g.shadow_direction.set(j, direction);
         g.shadow_end[j] = tfar;

@@ -319,21 +319,14 @@ impl Light {
 /// A sample towards the point `q` of a surface that emits `radiance`, chosen with density `pdf_area`. Of the surface's
 /// normals the shading one tells the side that shines, as for rays that hit it, and the geometric one the density.
 #[inline(always)]
-fn towards(p: Vec3, ng: Vec3, q: Vec3, normals: [Vec3; 2], radiance: Rgb, pdf_area: f32) -> Option<LightSample> {
-    let (sample, shines) = towards_anyhow(p, ng, q, normals, radiance, pdf_area);
-    shines.then_some(sample)
-}
-
-/// The sample, and whether there is one: without a branch, for loops over lanes.
-#[inline(always)]
-pub(crate) fn towards_anyhow(
+pub(crate) fn towards(
     p: Vec3,
     ng: Vec3,
     q: Vec3,
     [geometric, shading]: [Vec3; 2],
     radiance: Rgb,
     pdf_area: f32,
-) -> (LightSample, bool) {
+) -> Option<LightSample> {
     let origin = origin_towards(p, ng, q - p);
     let to = q - origin;
     let d2 = to.length_squared();
@@ -351,7 +344,7 @@ pub(crate) fn towards_anyhow(
         light: 0,
     };
     let from_behind = (wi.dot(shading) >= 0.0) | (cos == 0.0) | (d2 <= 0.0);
-    (sample, !from_behind)
+    (!from_behind).then_some(sample)
 }
 
 /// A density per area as one per solid angle at `origin`: times distance² over the cosine at the light.

@@ -49,9 +49,10 @@ impl Scatter for Diffuse {
 
     #[inline(always)]
     fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
-        // without a branch, for loops over lanes
-        let below = (wo.z <= 0.0) | (wi.z <= 0.0);
-        let pdf = if below { 0.0 } else { warp::cosine_hemisphere_pdf(wi.z) };
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::ZERO;
+        }
+        let pdf = warp::cosine_hemisphere_pdf(wi.z);
         Evaluation { value: self.reflectance * pdf, pdf }
     }
 
