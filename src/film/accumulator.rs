@@ -210,12 +210,17 @@ impl Accumulator {
             for splat in splats {
                 let Cell(sums) = &mut cells[splat.pixel as usize & in_band];
                 let mut over = false;
-                let [r, g, b] = splat.rgb.map(|value| self.rgb.fixed(value, &mut over));
-                let values = [r, g, b, self.weight.fixed(splat.weight, &mut over)];
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    let (total, beyond) = sum.overflowing_add(value);
-                    *sum = total;
-                    over |= beyond;
+                let [r, g, b] = splat.rgb;
+                let channels = [(r, self.rgb), (g, self.rgb), (b, self.rgb), (splat.weight, self.weight)];
+                let mut values = [0; 4];
+                for ((sum, kept), (value, fixed)) in sums.iter_mut().zip(&mut values).zip(channels) {
+                    // dark points and splats of one channel are common
+                    if value != 0.0 {
+                        *kept = fixed.fixed(value, &mut over);
+                        let (total, beyond) = sum.overflowing_add(*kept);
+                        *sum = total;
+                        over |= beyond;
+                    }
                 }
                 if over {
                     overflowed += 1;

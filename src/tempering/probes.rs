@@ -23,6 +23,9 @@ pub const EVEN: usize = RATIOS.len() - 2;
 /// The first of the layers with squares of what uniform points add.
 const SQUARES: usize = RATIOS.len();
 
+/// The layer that has the numbers of uniform points, for all.
+const COUNTS: usize = 0;
+
 /// Ways to move that are tried side by side, on a third of the ladders each.
 pub const TRIALS: usize = 3;
 
@@ -115,9 +118,14 @@ impl Probes {
     pub fn uniform(splats: &mut Splats, probe: u32, value: impl Fn(f64) -> f64, even: f64, points: f32) {
         for (layer, ratio) in RATIOS.into_iter().enumerate() {
             let value = value(ratio);
-            splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight: points });
-            let rgb = [value * value, even * value * value, 0.0].map(|v| v as f32);
-            splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
+            let weight = if layer == COUNTS { points } else { 0.0 };
+            if value != 0.0 || weight != 0.0 {
+                splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight });
+            }
+            if value != 0.0 {
+                let rgb = [value * value, even * value * value, 0.0].map(|v| v as f32);
+                splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
+            }
         }
     }
 
@@ -169,11 +177,12 @@ impl Probes {
     /// Σ over uniform points, Σ over states, number of uniform points, and Σ of squares over states, of every probe in
     /// both halves.
     pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
-        let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(ratio));
-        a.into_iter()
-            .zip(b)
-            .map(|(a, b)| [a, b].map(|[uniform, tempered, squares, n]| [uniform, tempered, n, squares]))
-            .collect()
+        let [[a, counts_a], [b, counts_b]] =
+            [0, 1].map(|half: usize| [ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
+        let with_count = |([uniform, tempered, squares, _], [.., n]): ([f64; 4], [f64; 4])| [uniform, tempered, n, squares];
+        let halves = [a.into_iter().zip(counts_a), b.into_iter().zip(counts_b)];
+        let [a, b] = halves.map(|half| half.map(with_count));
+        a.zip(b).map(|(a, b)| [a, b]).collect()
     }
 }
 
