@@ -20,8 +20,8 @@ pub const RATIOS: [f64; 8] = [0.0, 1.0 / 1024.0, 1.0 / 256.0, 1.0 / 64.0, 1.0 / 
 /// The ratio of the most evenly weighed image, 1.
 pub const EVEN: usize = RATIOS.len() - 2;
 
-/// The first of the layers with squares of what uniform points add.
-const SQUARES: usize = RATIOS.len();
+/// The first of the layers of states; those of uniform points come before.
+const STATES: usize = RATIOS.len();
 
 /// The layer that has the numbers of uniform points, for all.
 const COUNTS: usize = 0;
@@ -72,8 +72,8 @@ impl ProbeMap {
     }
 }
 
-/// Luminance gathered by the probes in each half of the blocks, one layer for each ratio that is tried, and as many for
-/// squares.
+/// Luminance gathered by the probes in each half of the blocks, and its squares: of uniform points one layer for each ratio
+/// that is tried, and of states as many.
 pub struct Probes {
     halves: [Accumulator; 2],
     trials: [[Accumulator; 2]; TRIALS],
@@ -120,11 +120,8 @@ impl Probes {
             let value = value(ratio);
             let weight = if layer == COUNTS { points } else { 0.0 };
             if value != 0.0 || weight != 0.0 {
-                splats.push(layer, Splat { pixel: probe, rgb: [value as f32, 0.0, 0.0], weight });
-            }
-            if value != 0.0 {
-                let rgb = [value * value, even * value * value, 0.0].map(|v| v as f32);
-                splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
+                let rgb = [value, value * value, even * value * value].map(|v| v as f32);
+                splats.push(layer, Splat { pixel: probe, rgb, weight });
             }
         }
     }
@@ -144,10 +141,8 @@ impl Probes {
     ) {
         for (layer, ratio) in RATIOS.into_iter().enumerate() {
             let (value, point) = (value(ratio), uniform(ratio));
-            let rgb = [0.0, weight * value, weight * value * value].map(|v| v as f32);
-            splats.push(layer, Splat { pixel: probe, rgb, weight: 0.0 });
-            let rgb = [0.0, 0.0, (weight * even * point * point) as f32];
-            splats.push(SQUARES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
+            let rgb = [value, value * value, even * point * point].map(|v| (weight * v) as f32);
+            splats.push(STATES + layer, Splat { pixel: probe, rgb, weight: 0.0 });
         }
     }
 
@@ -155,7 +150,7 @@ impl Probes {
     pub fn deposit(&self, half: usize, trial: Option<usize>, splats: &mut Splats) {
         if let Some(trial) = trial {
             let mut even = Splats::new(1);
-            splats.layer(EVEN).iter().for_each(|splat| even.push(0, *splat));
+            splats.layer(STATES + EVEN).iter().for_each(|splat| even.push(0, *splat));
             self.trials[trial][half].deposit(&mut even);
         }
         self.halves[half].deposit(splats);
@@ -164,25 +159,27 @@ impl Probes {
     /// For every probe, Σ of squares of what uniform points add: over uniform points, and the two parts of the most evenly
     /// weighed mean, that of uniform points and that of states.
     pub fn squares(&self, ratio: usize) -> Vec<[f64; 3]> {
-        let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(SQUARES + ratio));
-        a.into_iter().zip(b).map(|(a, b)| [0, 1, 2].map(|i| a[i] + b[i])).collect()
+        let [points, states] = [ratio, STATES + ratio].map(|layer| {
+            let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(layer));
+            a.into_iter().zip(b).map(|(a, b)| [a[1] + b[1], a[2] + b[2]]).collect::<Vec<_>>()
+        });
+        points.into_iter().zip(states).map(|([square, even], [_, of_states])| [square, even, of_states]).collect()
     }
 
     /// Σ over the states of a trial in both halves of every probe, as they are weighed most evenly.
     pub fn trial(&self, trial: usize) -> Vec<[f64; 2]> {
         let [a, b] = [0, 1].map(|half: usize| self.trials[trial][half].layer(0));
-        a.into_iter().zip(b).map(|(a, b)| [a[1], b[1]]).collect()
+        a.into_iter().zip(b).map(|(a, b)| [a[0], b[0]]).collect()
     }
 
     /// Σ over uniform points, Σ over states, number of uniform points, and Σ of squares over states, of every probe in
     /// both halves.
     pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
-        let [[a, counts_a], [b, counts_b]] =
-            [0, 1].map(|half: usize| [ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
-        let with_count = |([uniform, tempered, squares, _], [.., n]): ([f64; 4], [f64; 4])| [uniform, tempered, n, squares];
-        let halves = [a.into_iter().zip(counts_a), b.into_iter().zip(counts_b)];
-        let [a, b] = halves.map(|half| half.map(with_count));
-        a.zip(b).map(|(a, b)| [a, b]).collect()
+        let layers = [0, 1].map(|half: usize| [ratio, STATES + ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
+        let of_probe = |i: usize| {
+            layers.each_ref().map(|[points, states, counts]| [points[i][0], states[i][0], counts[i][3], states[i][1]])
+        };
+        (0..layers[0][0].len()).map(of_probe).collect()
     }
 }
 

@@ -24,8 +24,9 @@ const LEARNING_PART: f64 = 0.25;
 const FIRST_ROUND: u64 = 1 << 18;
 const FIRST_ROUND_A_PIXEL: u64 = 4;
 const LEARNING_ROUNDS: u32 = 5;
-/// Rounds from which on chains may be given up.
+/// Rounds from which on chains may be given up, and the same where uniform points leave them little to gain from the first.
 const ROUNDS_OF_GRACE: u32 = 3;
+const ROUNDS_OF_LITTLE_PROMISE: u32 = 2;
 /// Lanes that are evaluated together; a ladder longer than that is cut into parts.
 pub(super) const LANES_A_PART: usize = 512;
 /// Rungs are placed anew where the rejections that the density of states predicts differ by more.
@@ -358,10 +359,11 @@ impl<W: Default + Send> Sampler<W> {
 
     /// The weights and the share that serve best, where they are free.
     fn tune(&self, learnt: &Learnt, last: bool) -> Option<Choice> {
+        let grace = if self.state.promising { ROUNDS_OF_GRACE } else { ROUNDS_OF_LITTLE_PROMISE };
         // while chains are to show what they can do they keep a part of the work, less in each round
         let most = match (self.choices.ladder == LadderChoice::Auto, last) {
             // chains that promise nothing after some rounds are not listened to any longer
-            (true, last) if last || self.state.schedule.round >= ROUNDS_OF_GRACE => 1.0,
+            (true, last) if last || self.state.schedule.round >= grace => 1.0,
             (false, true) => MOST_UNIFORM_WITH_CHAINS,
             _ if !self.state.promising => MOST_UNIFORM_WITH_CHAINS,
             _ => 1.0 - 0.5f64.powi(self.state.schedule.round as i32 + 1),
