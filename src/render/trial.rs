@@ -126,10 +126,10 @@ pub fn try_mappings(scene: &Scene, settings: &Settings) -> Trial {
 
 /// Whether a trial with few points has told which mapping is best: errors by that of the unidirectional one, the first.
 fn is_clear(errors: &[(MappingKind, f64)]) -> bool {
-    let [best, second] = errors.iter().fold([f64::INFINITY; 2], |[best, second], (_, error)| {
-        if *error < best { [*error, best] } else { [best, error.min(second)] }
-    });
-    errors[1..].iter().all(|(_, error)| *error >= NO_BETTER) || second >= FAR_WORSE * best
+    let mut sorted: Vec<f64> = errors.iter().map(|(_, error)| *error).collect();
+    sorted.sort_by(f64::total_cmp);
+    let far_better = sorted.get(1).is_none_or(|second| *second >= FAR_WORSE * sorted[0]);
+    far_better || errors[1..].iter().all(|(_, error)| *error >= NO_BETTER)
 }
 
 /// Squared errors at equal cost, by that of the unidirectional mapping, which is the first, after so many points of each.

@@ -175,7 +175,8 @@ impl Probes {
     /// Σ over uniform points, Σ over states, number of uniform points, and Σ of squares over states, of every probe in
     /// both halves.
     pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
-        let layers = [0, 1].map(|half: usize| [ratio, STATES + ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
+        let layers =
+            [0, 1].map(|half: usize| [ratio, STATES + ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
         let of_probe = |i: usize| {
             layers.each_ref().map(|[points, states, counts]| [points[i][0], states[i][0], counts[i][3], states[i][1]])
         };
