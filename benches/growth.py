@@ -96,7 +96,12 @@ class Run:
             self.command += ["--replicas", "4"]
         if method == "re":
             self.command += ["--uniform-share", "0.5"]
-        self.pixels, self.budgets, self.found = size[0] * size[1], BUDGETS[method], []
+        self.pixels, self.found = size[0] * size[1], []
+        # memory of the film is first touched, and the picture is written, in both; that takes seconds on large films, so the
+        # difference is larger there
+        few, many = BUDGETS[method]
+        few += self.pixels / 1e6
+        self.budgets = (few, few + (many - BUDGETS[method][0]) * max(1, self.pixels / 2**22))
 
     def spent(self, millions):
         """CPU-seconds, mutations, rays and the most memory of a run."""
