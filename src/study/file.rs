@@ -31,7 +31,7 @@
 //! be built with the feature `mpi`; their processor time is not known, only wall time. `per-worker = true`: the budget in mutations is that of each worker, threads times ranks
 //! (weak scaling), and not of all together (strong scaling).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -248,9 +248,15 @@ impl Reader<'_> {
     fn study(&mut self, document: Document, parse: &ParseOptions) -> Option<Study> {
         let scenes: Vec<_> = document.scenes.into_iter().filter_map(|entry| self.scene(entry)).collect();
         let mut methods: Vec<StudyMethod> = Vec::new();
+        let mut names = HashSet::new();
         for entry in &document.methods {
+            if methods.len() > MOST_COMBINATIONS {
+                let what = format!("there are more than {MOST_COMBINATIONS} methods, which is the most accepted");
+                self.fault(entry.span(), what);
+                break;
+            }
             for method in self.methods(entry, &document.options, parse) {
-                if methods.iter().any(|other| other.name == method.name) {
+                if !names.insert(method.name.clone()) {
                     let what = format!(
                         "two methods are called `{}`; give a `name`, with {{option}} in it where lists are varied",
                         method.name
@@ -260,8 +266,9 @@ impl Reader<'_> {
                 methods.push(method);
             }
         }
-        for (i, scene) in scenes.iter().enumerate() {
-            if scenes[..i].iter().any(|other: &StudyScene| other.name == scene.name) {
+        let mut names = HashSet::new();
+        for scene in &scenes {
+            if !names.insert(&scene.name) {
                 let what = format!("two scenes are called `{}`; give one a `name`", scene.name);
                 self.fault(0..0, what);
             }
@@ -321,8 +328,9 @@ impl Reader<'_> {
         if seeds.is_empty() {
             self.fault(span.clone(), "`seeds` are none; one at least is needed, five tell how results spread");
         }
-        if let Some(twice) = (1..seeds.len()).find(|i| seeds[..*i].contains(&seeds[*i])) {
-            self.fault(span, format!("seed {} is given twice", seeds[twice]));
+        let mut before = HashSet::new();
+        if let Some(twice) = seeds.iter().find(|seed| !before.insert(**seed)) {
+            self.fault(span, format!("seed {twice} is given twice"));
         }
         seeds
     }

@@ -375,8 +375,11 @@ fn what_a_conversion_nests_or_saves_is_bounded() {
 fn studies_do_not_grow_without_bounds() {
     let folder = Folder::new(&[]);
     let lists: String = (0..30).map(|i| format!("a{i} = [1, 2, 3]\n")).collect();
+    let eight = &lists[..lists.find("a8").unwrap()];
+    let entries = vec![eight; 40].join("[[method]]\n");
     for (head, method, message) in [
         ("", &lists[..], "its lists make more than 10000 methods, which is the most accepted"),
+        ("", &entries[..], "there are more than 10000 methods, which is the most accepted"),
         ("seeds = 9223372036854775807", "", "`seeds` are more than 10000, which is the most accepted"),
         ("note = \"\\uD800\"", "", "a.toml:"),
     ] {
