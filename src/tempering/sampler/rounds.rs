@@ -380,8 +380,13 @@ impl<W: Default + Send> Sampler<W> {
         let measured = self.measured(learnt)?;
         let choice = measured.choose(&shares, unmeasured);
         let surprise = choice.relative_error < SURPRISE;
-        let only_watch = !self.state.promising && !surprise && self.choices.uniform_share.is_none() && most < 1.0;
-        Some(if only_watch { measured.choose(&(*shares.end()..=*shares.end()), unmeasured) } else { choice })
+        let holds = !self.state.promising && !surprise && self.choices.uniform_share.is_none();
+        Some(match holds {
+            // what little promise came to is measured with noise: half the error may be chance
+            true if most >= 1.0 => Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            true => measured.choose(&(*shares.end()..=*shares.end()), unmeasured),
+            false => choice,
+        })
     }
 
     /// What the round has measured, if it has.
