@@ -100,8 +100,8 @@ class Run:
         # memory of the film is first touched, and the picture is written, in both; that takes seconds on large films, so the
         # difference is larger there
         few, many = BUDGETS[method]
-        few += self.pixels / 1e6
-        self.budgets = (few, few + (many - BUDGETS[method][0]) * max(1, self.pixels / 2**22))
+        start = few + self.pixels / 1e6
+        self.budgets = (start, start + (many - few) * max(1, self.pixels / 2**22))
 
     def spent(self, millions):
         """CPU-seconds, mutations, rays and the most memory of a run."""

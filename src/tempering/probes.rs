@@ -156,31 +156,25 @@ impl Probes {
         self.halves[half].deposit(splats);
     }
 
-    /// For every probe, Σ of squares of what uniform points add: over uniform points, and the two parts of the most evenly
-    /// weighed mean, that of uniform points and that of states.
-    pub fn squares(&self, ratio: usize) -> Vec<[f64; 3]> {
-        let [points, states] = [ratio, STATES + ratio].map(|layer| {
-            let [a, b] = [0, 1].map(|half: usize| self.halves[half].layer(layer));
-            a.into_iter().zip(b).map(|(a, b)| [a[1] + b[1], a[2] + b[2]]).collect::<Vec<_>>()
-        });
-        points.into_iter().zip(states).map(|([square, even], [_, of_states])| [square, even, of_states]).collect()
-    }
-
     /// Σ over the states of a trial in both halves of every probe, as they are weighed most evenly.
     pub fn trial(&self, trial: usize) -> Vec<[f64; 2]> {
         let [a, b] = [0, 1].map(|half: usize| self.trials[trial][half].layer(0));
         a.into_iter().zip(b).map(|(a, b)| [a[0], b[0]]).collect()
     }
 
-    /// Σ over uniform points, Σ over states, number of uniform points, and Σ of squares over states, of every probe in
-    /// both halves.
-    pub fn sums(&self, ratio: usize) -> Vec<[[f64; 4]; 2]> {
+    /// What every probe has for a ratio: in both halves Σ over uniform points, Σ over states, number of uniform points, and Σ of
+    /// squares over states; and of both together Σ of squares of what uniform points add, over uniform points and as the two
+    /// parts of the most evenly weighed mean, that of uniform points and that of states.
+    pub fn sums(&self, ratio: usize) -> (Vec<[[f64; 4]; 2]>, Vec<[f64; 3]>) {
         let layers =
             [0, 1].map(|half: usize| [ratio, STATES + ratio, COUNTS].map(|layer| self.halves[half].layer(layer)));
         let of_probe = |i: usize| {
-            layers.each_ref().map(|[points, states, counts]| [points[i][0], states[i][0], counts[i][3], states[i][1]])
+            let halves = layers.each_ref().map(|layers| layers.each_ref().map(|layer| layer[i]));
+            let [[a, a_states, _], [b, b_states, _]] = halves;
+            let squares = [a[1] + b[1], a[2] + b[2], a_states[2] + b_states[2]];
+            (halves.map(|[points, states, counts]| [points[0], states[0], counts[3], states[1]]), squares)
         };
-        (0..layers[0][0].len()).map(of_probe).collect()
+        (0..layers[0][0].len()).map(of_probe).unzip()
     }
 }
 

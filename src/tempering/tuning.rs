@@ -24,7 +24,7 @@ pub struct Measured {
     /// By ratio and probe: the two halves' Σ over uniform points, Σ over states, number of uniform points, and Σ of squares
     /// over states.
     pub probes: Vec<Vec<[[f64; 4]; 2]>>,
-    /// By ratio and probe: [`Probes::squares`](super::Probes::squares).
+    /// By ratio and probe: the squares of [`Probes::sums`](super::Probes::sums).
     pub squares: Vec<Vec<[f64; 3]>>,
     /// Number of pixels of the film.
     pub pixels: f64,
