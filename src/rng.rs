@@ -36,6 +36,8 @@ pub enum Purpose {
     Technique = 10,
     /// Seeds of the parts of a job.
     Part = 11,
+    /// Looks at what is in plain view of an open point's pixel; the number of the look is the replica's.
+    View = 12,
 }
 
 /// Identifies one call for four random words.

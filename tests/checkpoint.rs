@@ -172,7 +172,7 @@ fn another_version_is_named() {
     let version = env!("CARGO_PKG_VERSION");
     for (from, to, part) in [
         (format!("\"relt\":\"{version}\""), "\"relt\":\"99.1.2\"", "relt 99.1.2 (format 1)"),
-        ("\"relt_checkpoint\":1".into(), "\"relt_checkpoint\":77", "(format 77)"),
+        ("\"relt_checkpoint\":2".into(), "\"relt_checkpoint\":77", "(format 77)"),
     ] {
         fs::write(&file, sealed_with(&good, &from, to)).unwrap();
         let text = ended(&mut render(folder.path(), "cornell-box", &["--resume", "a.checkpoint"]), 2);

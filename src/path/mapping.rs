@@ -101,6 +101,7 @@ pub struct Mapping<'s> {
     /// How points of the multiplexed mapping choose.
     lengths: Lengths,
     technique_changes: bool,
+    views_left_open: bool,
     evaluate: Evaluate,
     evaluate_open: Option<Evaluate>,
     walk: Walk,
@@ -177,6 +178,7 @@ impl<'s> Mapping<'s> {
             layout,
             widths,
             technique_changes: false,
+            views_left_open: false,
             evaluate,
             evaluate_open: (kind == MappingKind::Multiplexed).then_some(open),
             walk,
@@ -234,6 +236,19 @@ impl<'s> Mapping<'s> {
     /// Whether chains are to change techniques.
     pub fn technique_changes(&self) -> bool {
         self.technique_changes
+    }
+
+    /// Leaves light that is seen directly, or by way of perfect mirrors and smooth glass only, to points that leave
+    /// [open](Self::evaluate_open) what they choose, which look for it apart; points that choose it are dark. Where there are no perfect
+    /// lobes, chains keep it.
+    pub fn with_views_left_open(mut self, left: bool) -> Self {
+        self.views_left_open = left && self.has_outcomes() && self.scene.features.delta_lobes;
+        self
+    }
+
+    /// Whether light that is seen by way of perfect lobes only is left to open points.
+    pub fn views_left_open(&self) -> bool {
+        self.views_left_open
     }
 
     /// Whether points choose among outcomes that can be had all at once.

@@ -28,7 +28,7 @@ use super::{
 use crate::{
     film::Footprint,
     math::denormals,
-    path::{Fault, Mapping, MappingKind, Widths, first_fault},
+    path::{Fault, MappingKind, Widths, first_fault},
     ranks::Company,
     rng::Rng,
     saved::{Source, Unfit},
@@ -137,7 +137,7 @@ pub fn run_on(
     };
     let film = job.scene.film;
     let stage = Stage {
-        mapping: Mapping::new(job.scene, mapping, widths).with_technique_changes(settings.technique_changes),
+        mapping: settings.mapping(job.scene, mapping, widths),
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(settings.seed),
     };
@@ -617,9 +617,10 @@ mod tests {
         let description = crate::load::scene(&path, &[("res".into(), "4".into())]).unwrap();
         let scene = Scene::new(&Device::new("").unwrap(), description).unwrap();
         let settings = Settings { mutations_per_pixel: None, ..Settings::default() };
-        let job = Job { scene: &scene, scene_name: "box".into(), settings, stop: &AtomicBool::new(false) };
+        let job =
+            Job { scene: &scene, scene_name: "box".into(), settings: settings.clone(), stop: &AtomicBool::new(false) };
         let stage = Stage {
-            mapping: Mapping::new(
+            mapping: settings.mapping(
                 &scene,
                 MappingKind::Unidirectional,
                 Widths { camera: Width::W1, bounce: Width::W1, shadow: Width::W1 },

@@ -9,7 +9,8 @@ pub use super::parts::Parts;
 use crate::chain::LARGE_STEP_PROBABILITY;
 pub use crate::chain::Measure;
 use crate::embree::Width;
-use crate::path::MappingKind;
+use crate::path::{Mapping, MappingKind, Widths};
+use crate::scene::Scene;
 pub use crate::tempering::{Choices, Combine, LadderChoice};
 
 /// How the image is estimated.
@@ -284,6 +285,13 @@ impl Settings {
             measure: self.measure,
             layers: self.layers,
         }
+    }
+
+    /// The mapping of a scene as the method needs it.
+    pub fn mapping<'s>(&self, scene: &'s Scene, kind: MappingKind, widths: Widths) -> Mapping<'s> {
+        // the images of single rungs have what their own states find, and nothing of open points
+        let balanced = self.method == Method::ReplicaExchange && self.combine == Combine::Balance && !self.layers;
+        Mapping::new(scene, kind, widths).with_technique_changes(self.technique_changes).with_views_left_open(balanced)
     }
 
     /// The inverse temperatures that were asked for by number; none where relt places them.

@@ -146,6 +146,16 @@ impl Proposals<'_> {
         self.points.set(block, lane, proposed);
     }
 
+    /// A first block in the place of a lane's own: of another point in the same pixel where the lane's is
+    /// [stratified](Move::Stratified), of any point otherwise; uniform there if `words` are.
+    #[inline(always)]
+    pub fn beside(&self, lane: usize, words: Block) -> Block {
+        match self.moves[lane] {
+            Move::Stratified => within_pixel(self.counters[lane].ladder, self.film, words),
+            _ => words,
+        }
+    }
+
     /// Block `block` of a lane, drawn before.
     #[inline(always)]
     pub fn block(&self, block: u16, lane: usize) -> Block {

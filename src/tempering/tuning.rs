@@ -53,13 +53,30 @@ pub struct Choice {
     pub relative_error: f64,
 }
 
-impl Measured {
-    /// The best choice within the shares that are free; path tracing where chains do not promise to be better by far.
-    /// Where nothing was measured uniform points get the share `unmeasured`.
-    pub fn choose(&self, shares: &RangeInclusive<f64>, unmeasured: f64) -> Choice {
-        let importances = self.importances();
-        let [cost_u, cost_t] = self.cost;
-        let path = self.variances(0, &importances)[0] * cost_u;
+/// U and T by ratio, as one round or several have measured them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variances([[f64; 2]; RATIOS.len()]);
+
+impl Variances {
+    /// Geometric means over rounds, each of which counts the same; of values that a round has not measured (0) those of the
+    /// others.
+    ///
+    /// Both are sums of squares that a few bright paths decide, and a chain that is stuck for a part of one round is a hundred
+    /// times as much as all others: means would be those of the worst round.
+    pub fn pooled(rounds: &[Variances]) -> Variances {
+        let mean = |ratio: usize, of: usize| {
+            let known = rounds.iter().map(|round| round.0[ratio][of]).filter(|variance| *variance > 0.0);
+            let (sum, count) = known.fold((0.0, 0), |(sum, count), variance| (sum + libm::log(variance), count + 1));
+            if count == 0 { 0.0 } else { libm::exp(sum / f64::from(count)) }
+        };
+        Variances(std::array::from_fn(|ratio| [0, 1].map(|of| mean(ratio, of))))
+    }
+
+    /// The best choice within the shares that are free, where an evaluation on the uniform rung and on the others costs
+    /// `cost`; path tracing where chains do not promise to be better by far. Where nothing was measured uniform points get the
+    /// share `unmeasured`.
+    pub fn choose(&self, [cost_u, cost_t]: [f64; 2], shares: &RangeInclusive<f64>, unmeasured: f64) -> Choice {
+        let path = self.0[0][0] * cost_u;
         let most = *shares.end();
         if path == 0.0 {
             // no noise at all, as of a constant, or too few points to see any: nothing to choose by
@@ -67,8 +84,7 @@ impl Measured {
         }
         let error = if most >= 1.0 { PROMISE } else { f64::INFINITY };
         let mut best = Choice { ratio: 0.0, share: 1.0, relative_error: error };
-        for (i, ratio) in RATIOS.into_iter().enumerate().skip(1) {
-            let [u, t] = self.variances(i, &importances);
+        for (ratio, [u, t]) in RATIOS.into_iter().zip(self.0).skip(1) {
             let odds = ((u * cost_t) / (t * cost_u)).sqrt();
             // all the variance on one side gives no odds
             let share = if odds.is_finite() { odds / (1.0 + odds) } else { most };
@@ -79,6 +95,14 @@ impl Measured {
             }
         }
         best
+    }
+}
+
+impl Measured {
+    /// U and T for every ratio.
+    pub fn variances(&self) -> Variances {
+        let importances = self.importances();
+        Variances(std::array::from_fn(|ratio| self.variances_with(ratio, &importances)))
     }
 
     /// The noise of one trial's states, weighed most evenly, up to a factor that is the same for all trials: Σ over
@@ -160,7 +184,7 @@ impl Measured {
     }
 
     /// U and T with the ratio number `i`.
-    fn variances(&self, i: usize, importances: &[f64]) -> [f64; 2] {
+    fn variances_with(&self, i: usize, importances: &[f64]) -> [f64; 2] {
         let [mut u, mut t, mut seen] = [0.0; 3];
         for (halves, importance) in self.probes[i].iter().zip(importances) {
             let counts = halves.map(|half| half[2]);
@@ -189,3 +213,33 @@ const PROMISE: f64 = 0.5;
 const MOST_WITH_CHAINS: f64 = 31.0 / 32.0;
 /// Probes whose median stands for the luminance of the one in their middle.
 const NEIGHBOURS: usize = 9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// U and T that are the same for every ρ.
+    fn round(u: f64, t: f64) -> Variances {
+        Variances([[u, t]; RATIOS.len()])
+    }
+
+    #[test]
+    fn a_round_in_which_a_chain_was_stuck_does_not_end_the_chains() {
+        // uniform points have little noise left beside chains
+        let [good, stuck] = [0.004, 0.4].map(|t| {
+            let mut round = round(0.01, t);
+            round.0[0][0] = 1.0;
+            round
+        });
+        let choice = |rounds: &[Variances]| Variances::pooled(rounds).choose([1.0; 2], &(0.0..=1.0), 0.5).ratio;
+        assert_eq!(choice(std::slice::from_ref(&stuck)), 0.0, "alone it would");
+        assert!(choice(&[good.clone(), good, stuck]) > 0.0);
+    }
+
+    #[test]
+    fn rounds_that_saw_nothing_are_left_out() {
+        let [u, t] = Variances::pooled(&[round(4.0, 0.0), round(0.0, 9.0), round(1.0, 1.0)]).0[3];
+        assert!((u - 2.0).abs() < 1e-12 && (t - 3.0).abs() < 1e-12, "{u} {t}");
+        assert_eq!(Variances::pooled(&[round(0.0, 0.0)]), round(0.0, 0.0));
+    }
+}

@@ -3,7 +3,7 @@
 use relt::embree::Width;
 use relt::path::{Contributions, Mapping, MappingKind, Outcome, Workspace};
 use relt::rng::{Counter, Purpose, Rng};
-use relt::sample::{Move, Points, Proposals};
+use relt::sample::{Move, PixelOrder, Points, Proposals};
 use relt::scene::Scene;
 
 use crate::support::{fixed_widths, load, own, repository};
@@ -114,6 +114,76 @@ fn outcomes_are_what_points_contribute_that_choose_them() {
         assert!(lost == 0 || plays && lost < found / 2, "{name}: {lost} choices are no outcomes, {found} are");
     }
 }
+
+/// Luminance that a pass of stratified points has as its outcomes: of those that points may choose, and of others.
+fn passes(mapping: &Mapping, count: usize) -> Vec<[f64; 2]> {
+    let film = [mapping.scene().film.width, mapping.scene().film.height];
+    let pixels = (film[0] * film[1]) as usize;
+    let (nowhere, mut points) = (Points::new(0), Points::new(pixels));
+    let (mut out, mut workspace) = (Contributions::new(pixels), Workspace::default());
+    let mut pass = |number: usize| {
+        let counters: Vec<Counter> = PixelOrder::new(film).points_from((number * pixels) as u64).take(pixels).collect();
+        let mut proposals = Proposals {
+            rng: Rng::new(4),
+            current: &nowhere,
+            given: &nowhere,
+            points: &mut points,
+            counters: &counters,
+            moves: &vec![Move::Stratified; pixels],
+            film,
+        };
+        mapping.evaluate_open(&mut proposals, &mut out, &mut workspace);
+        let mut sums = [0.0; 2];
+        for (lane, counter) in counters.iter().enumerate() {
+            for outcome in out.outcomes.of(lane) {
+                sums[usize::from(outcome.chance == 0.0)] += outcome.splat.luminance();
+                if outcome.own {
+                    let [x, y] = [0, 1].map(|i| (outcome.splat.film[i] * film[i] as f32) as u32);
+                    assert_eq!(y * film[0] + x, counter.ladder, "in the pixel of its point");
+                }
+            }
+        }
+        sums
+    };
+    (0..count).map(&mut pass).collect()
+}
+
+/// Lamps and sky that are seen directly or by way of perfect lobes only are no longer among what points choose; what open points
+/// find of them by looks of their own has the same mean, and all else is the same to the bit.
+#[test]
+fn light_in_plain_view_is_left_to_looks() {
+    let depth = [("res", "16"), ("max_depth", "6")];
+    let scenes = [("glass", load(&repository("tests/mitsuba/glass.xml"), &[])), ("caustic", own("caustic", &depth))];
+    for (name, scene) in &scenes {
+        let mapping = || Mapping::new(scene, MappingKind::Multiplexed, fixed_widths(Width::W8));
+        let (chosen, left) = (mapping(), mapping().with_views_left_open(true));
+        let mut differences = Vec::new();
+        let (mut among, mut looked) = (0.0, 0.0);
+        for ([all, none], [others, views]) in passes(&chosen, PASSES).into_iter().zip(passes(&left, PASSES)) {
+            assert_eq!(none, 0.0, "{name}");
+            (among, looked) = (among + all - others, looked + views);
+            differences.push(all - others - views);
+        }
+        let mean = differences.iter().sum::<f64>() / PASSES as f64;
+        let square = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (PASSES - 1) as f64;
+        let z = mean / (square / PASSES as f64).sqrt();
+        // level 6·10⁻⁵ for each scene
+        assert!(z.abs() < 4.0 && looked > 0.0, "{name}: {among} among all, {looked} by looks, z = {z:.2}");
+    }
+    let (_, glass) = &scenes[0];
+    let mapping = || Mapping::new(glass, MappingKind::Multiplexed, fixed_widths(Width::W8));
+    let [chosen, left] = [mapping(), mapping().with_views_left_open(true)].map(|mapping| {
+        let technique = mapping.lengths().technique_word(1, 0, 1 << 31);
+        let points = evaluate(&mapping, Some([length_word(&mapping, 1), technique]), false);
+        points.lanes.iter().filter(|lane| !lane.is_dark()).count()
+    });
+    assert!(
+        chosen > 0 && left == 0,
+        "{chosen} points that choose an edge see the sky, {left} where that is left to looks"
+    );
+}
+
+const PASSES: usize = 200;
 
 #[test]
 fn other_mappings_have_one_outcome() {

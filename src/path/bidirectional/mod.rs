@@ -14,6 +14,7 @@ mod lengths;
 pub mod scalar;
 mod subpath;
 mod techniques;
+mod views;
 mod weights;
 
 pub(super) use inversion::change_technique;
@@ -53,6 +54,8 @@ pub(super) struct Arrays {
     steps: Vec<Step>,
     particles: Vec<Particle>,
     carried: Vec<Carried>,
+    /// Whether camera subpaths have met nothing but perfect lobes, in step with `carried`.
+    specular: Vec<bool>,
     /// Starts of light subpaths, in step with `lanes` along their first edges.
     emissions: Vec<Emission>,
     hits: Hits,
@@ -160,7 +163,10 @@ fn trace_both<P: Profile, const HOW: u8>(
     if mapping.kind().techniques().follow_camera() {
         follow_camera::<P, HOW>(mapping, proposals, out, tracing, w);
     }
-    if HOW == OPEN { settle_outcomes(proposals, w, out) } else { settle::<HOW>(proposals, w, out) }
+    if HOW == OPEN && mapping.views_left_open() {
+        views::look::<P>(mapping, proposals, tracing, w, out);
+    }
+    if HOW == OPEN { settle_outcomes(proposals, out) } else { settle::<HOW>(proposals, w, out) }
 }
 
 /// Draws what is chosen for both subpaths, and forgets all lanes' past.
@@ -188,6 +194,7 @@ fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut 
         out.elsewhere.clear(at);
         if HOW == OPEN {
             out.outcomes.clear(at);
+            out.lanes[at] = Contribution { film: [x, y], ..Contribution::NONE };
         }
         if HOW == ONE
             && let Some(block) = mapping.layout().light_choices()
@@ -406,6 +413,8 @@ fn follow_camera<P: Profile, const HOW: u8>(
 fn start_at_camera<const HOW: u8>(mapping: &Mapping, w: &mut Arrays) {
     begin_subpaths::<HOW>(w, |chosen| chosen.camera > 1);
     w.carried.clear();
+    w.specular.clear();
+    w.specular.resize(w.lanes.len(), true);
     for &lane in &w.lanes {
         let ray = mapping.scene().camera.ray(w.film[lane as usize], w.lens[lane as usize]);
         w.rays.push(ray.origin, ray.direction, ray.tfar);
@@ -421,6 +430,9 @@ fn collect_background<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, w: &
     for i in 0..w.lanes.len() {
         let at = w.lanes[i] as usize;
         if w.hits.geometry[i] != MISS || HOW == ONE && !w.chosen[at].is(0, j + 1) {
+            continue;
+        }
+        if HOW != SUM && mapping.views_left_open() && w.specular[i] {
             continue;
         }
         let tail = if j == 1 { subpath::STRAIGHT_OUT } else { w.steps[i].arrive_at_infinity() };
@@ -464,7 +476,8 @@ fn scatter_camera<P: Profile, const HOW: u8>(
         let end = CameraEnd { carried: w.carried[i], tail };
         let chosen = if HOW == ONE { w.chosen[at] } else { Chosen::NONE };
         let scale = if HOW == ONE { chosen.scale } else { 1.0 };
-        if HOW != ONE || chosen.is(0, j + 1) {
+        let left_open = HOW != SUM && mapping.views_left_open() && w.specular[i];
+        if (HOW != ONE || chosen.is(0, j + 1)) && !left_open {
             let radiance = connections::hit::<P>(scene, techniques, &surface, (origin, direction), &end, j);
             if HOW == OPEN {
                 if radiance != Rgb::ZERO {
@@ -522,6 +535,7 @@ fn scatter_camera<P: Profile, const HOW: u8>(
         if let Some((edge, step)) = subpath::scatter_camera::<P>(&surface, &end, &decisions, techniques, j) {
             w.lanes[kept] = lane;
             w.carried[kept] = edge.carried;
+            w.specular[kept] = w.specular[i] && edge.carried.pdf == f32::INFINITY;
             w.steps[kept] = step;
             w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
             kept += 1;
@@ -529,6 +543,7 @@ fn scatter_camera<P: Profile, const HOW: u8>(
     }
     w.lanes.truncate(kept);
     w.carried.truncate(kept);
+    w.specular.truncate(kept);
     w.rays.truncate(kept);
 }
 
@@ -555,10 +570,9 @@ fn outcome(film: [f32; 2], rgb: Rgb, chance: f32) -> Outcome {
 }
 
 /// Settles outcomes that are not finite; the points themselves are dark.
-fn settle_outcomes(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
+fn settle_outcomes(proposals: &Proposals, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
-            out.lanes[lane] = Contribution { film: w.film[lane], ..Contribution::NONE };
             let mut causes = Causes::NONE;
             out.outcomes.of_mut(lane).iter_mut().for_each(|outcome| outcome.settle(&mut causes));
             if !causes.is_none() {

@@ -106,6 +106,13 @@ impl Point<'_, '_> {
         }
     }
 
+    /// The same of what the end of a camera subpath finds by itself at its vertex number `j`, where nothing but perfect lobes
+    /// may lie between it and the lens.
+    fn scale_of_view(&self, j: u16, specular: bool) -> Option<f32> {
+        let left_open = self.chosen.is_some() && specular && self.mapping.views_left_open();
+        self.scale(0, j + 1).filter(|_| !left_open)
+    }
+
     fn is_seen(&self, connection: &Connection) -> bool {
         !self.scene().tracer.occluded_one(connection.origin, connection.direction, connection.tfar)
     }
@@ -217,12 +224,12 @@ impl Point<'_, '_> {
         let mut ray = scene.camera.ray(self.film, self.lens);
         let (film, lens) = (self.film, self.lens);
         self.narration.tell(|| walk::camera(film, lens, &ray));
-        let (mut carried, mut step) = (Carried::START, None::<Step>);
+        let (mut carried, mut step, mut specular) = (Carried::START, None::<Step>, true);
         for j in 1..=layout.max_depth() {
             let at = (Side::Camera, j);
             let Some(hit) = scene.tracer.closest_one(ray.origin, ray.direction, ray.tfar) else {
                 let tail = step.as_ref().map_or(subpath::STRAIGHT_OUT, |step| step.arrive_at_infinity());
-                if let Some(scale) = self.scale(0, j + 1) {
+                if let Some(scale) = self.scale_of_view(j, specular) {
                     let end = CameraEnd { carried, tail };
                     let found = connections::background::<P>(scene, techniques, ray.direction, &end, j) * scale;
                     self.radiance += found;
@@ -241,7 +248,7 @@ impl Point<'_, '_> {
             };
             self.narration.tell(|| walk::vertex(scene, at, &surface, carried.throughput, f64::from(carried.pdf)));
             let end = CameraEnd { carried, tail };
-            if let Some(scale) = self.scale(0, j + 1) {
+            if let Some(scale) = self.scale_of_view(j, specular) {
                 let edge = (ray.origin, ray.direction);
                 let found = connections::hit::<P>(scene, techniques, &surface, edge, &end, j) * scale;
                 self.radiance += found;
@@ -293,6 +300,7 @@ impl Point<'_, '_> {
             let (throughput, density) = (edge.carried.throughput, f64::from(edge.carried.pdf));
             self.narration.tell(|| walk::scattered(at, &surface, edge.direction, throughput, density));
             (ray.origin, ray.direction, ray.tfar) = (edge.origin, edge.direction, f32::MAX);
+            specular &= edge.carried.pdf == f32::INFINITY;
             (carried, step) = (edge.carried, Some(next));
         }
     }

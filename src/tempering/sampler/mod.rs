@@ -31,7 +31,7 @@ use super::{
     independent::{Independent, Use},
     probes::TRIALS,
     steps::{self, StepCount},
-    tuning::Choice,
+    tuning::{Choice, Variances},
 };
 use crate::{
     chain::{FEWEST_BLOCKS, Importance, Measure, Plan, Start, Target, TechniqueChanges},
@@ -85,6 +85,8 @@ struct State {
     ladders_a_block: usize,
     /// Weights and shares of the round.
     choice: Choice,
+    /// What each round has measured of the errors of points and of states.
+    variances: Vec<Variances>,
     /// Whether uniform points leave chains anything to gain, as far as is known before there are any.
     promising: bool,
     /// Centre of the sizes of steps on the target, in scales of the bank.
@@ -129,6 +131,7 @@ impl State {
             offers: 0,
             ladders_a_block: 0,
             choice: Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
+            variances: Vec::new(),
             promising: true,
             centre: steps::KELEMEN,
             moved: false,

@@ -13,7 +13,7 @@ use crate::{
         placement::rungs,
         probes::{RATIOS, TRIALS},
         steps,
-        tuning::{Choice, Measured},
+        tuning::{Choice, Measured, Variances},
     },
 };
 
@@ -309,7 +309,7 @@ impl<W: Default + Send> Sampler<W> {
         Some(format!(
             "{} steps, of about 2^{:.0}: {:.2} times the noise",
             if best < UNSHIFTED { "shorter" } else { "longer" },
-            2.0 * self.state.centre - 12.0,
+            libm::log2(steps::size(self.state.centre)),
             noise[best] / noise[UNSHIFTED]
         ))
     }
@@ -362,7 +362,9 @@ impl<W: Default + Send> Sampler<W> {
     }
 
     /// The weights and the share that serve best, where they are free.
-    fn tune(&self, measured: &Measured, last: bool) -> Choice {
+    fn tune(&mut self, measured: &Measured, last: bool) -> Choice {
+        self.state.variances.push(measured.variances());
+        let variances = Variances::pooled(&self.state.variances);
         let grace = if self.state.promising { ROUNDS_OF_GRACE } else { ROUNDS_OF_LITTLE_PROMISE };
         // while chains are to show what they can do they keep a part of the work, less in each round
         let most = match (self.choices.ladder == LadderChoice::Auto, last) {
@@ -381,14 +383,14 @@ impl<W: Default + Send> Sampler<W> {
         let least = least.max(seen).min(most);
         let shares = self.choices.uniform_share.map_or(least..=most, |share| share..=share);
         let unmeasured = self.share_of_evaluations(0.5);
-        let choice = measured.choose(&shares, unmeasured);
+        let choice = variances.choose(measured.cost, &shares, unmeasured);
         let surprise = choice.relative_error < SURPRISE;
         if self.state.promising || surprise || self.choices.uniform_share.is_some() {
             return choice;
         }
         // what little promise came to is measured with noise, and half the error may be chance: chains are only watched
         match most < 1.0 {
-            true => measured.choose(&(most..=most), unmeasured),
+            true => variances.choose(measured.cost, &(most..=most), unmeasured),
             false => Choice { ratio: 0.0, share: 1.0, relative_error: 1.0 },
         }
     }
