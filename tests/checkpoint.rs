@@ -171,12 +171,12 @@ fn another_version_is_named() {
     let good = fs::read(&file).unwrap();
     let version = env!("CARGO_PKG_VERSION");
     for (from, to, part) in [
-        (format!("\"relt\":\"{version}\""), "\"relt\":\"99.1.2\"", "relt 99.1.2 (format 1)"),
+        (format!("\"relt\":\"{version}\""), "\"relt\":\"99.1.2\"", "relt 99.1.2 (format 2)"),
         ("\"relt_checkpoint\":2".into(), "\"relt_checkpoint\":77", "(format 77)"),
     ] {
         fs::write(&file, sealed_with(&good, &from, to)).unwrap();
         let text = ended(&mut render(folder.path(), "cornell-box", &["--resume", "a.checkpoint"]), 2);
-        assert!(text.contains(part) && text.contains(&format!("this is relt {version} (format 1)")), "{text}");
+        assert!(text.contains(part) && text.contains(&format!("this is relt {version} (format 2)")), "{text}");
     }
 }
 

@@ -18,6 +18,12 @@ const MOST_TEXELS_ACROSS: u32 = 65_536;
 /// Most memory that decoding a picture may take, in bytes. Keeps small files of huge pictures from exhausting memory.
 const MOST_MEMORY: u64 = 4 << 30;
 
+/// Texels that a byte of a file may stand for: PNG's compression makes up to 1032 bytes of one, with eight black or white texels
+/// each; JPEG and HDR stay far below. What a decoder makes up for files that end too soon is not theirs.
+const TEXELS_OF_BYTE: u64 = 8 * 1032;
+/// Texels that any file may have.
+const TEXELS_OF_ANY: u64 = 1 << 24;
+
 /// Bytes that a texel takes at most while its picture is decoded: as four numbers and, made of them, as three.
 const BYTES_OF_TEXEL: u64 = 4 * 4 + 3 * 4;
 
@@ -72,8 +78,11 @@ fn decode_other(bytes: &[u8]) -> Result<Image, String> {
     }
     let (width, height) = sized.into_dimensions().map_err(|error| format!("cannot be decoded: {error}"))?;
     if width.max(height) <= MOST_TEXELS_ACROSS {
-        let bytes = BYTES_OF_TEXEL * u64::from(width) * u64::from(height);
-        memory::check(bytes, format_args!("{width} × {height} texels"))?;
+        let texels = u64::from(width) * u64::from(height);
+        if texels > TEXELS_OF_ANY + TEXELS_OF_BYTE * bytes.len() as u64 {
+            return Err(format!("{} bytes cannot hold its {width} × {height} texels", bytes.len()));
+        }
+        memory::check(BYTES_OF_TEXEL * texels, format_args!("{width} × {height} texels"))?;
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(MOST_TEXELS_ACROSS);

@@ -179,6 +179,8 @@ fn pictures_may_not_be_larger_than_what_there_is_to_hold_them() {
         let hdr = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
         load::picture(hdr.as_bytes()).unwrap_err();
     }
+    let fault = load::picture(&png(20_000, 20_000)).unwrap_err();
+    assert!(fault.contains("bytes cannot hold its 20000 × 20000 texels"), "{fault}");
     // a real OpenEXR file with another size in its header
     let folder = Folder::new(&[]);
     let path = folder.path("a.exr");
