@@ -58,15 +58,15 @@ fn stops_come_at_the_same_evaluations_however_a_run_is_sliced() {
     let toy = two_peaks();
     for choices in [Choices::default(), replicas(3, Combine::Balance)] {
         let stops = |slice: u64| {
-            let mut sampler = sampler::<Toy>(choices.clone(), 16, 1 << 15, 7);
-            let stops = [1, 700, 5_000, 11_111, 20_000].map(|until| {
+            let mut sampler = sampler::<Toy>(choices.clone(), 16, 1 << 18, 7);
+            let stops = [1, 5_600, 40_000, 88_888, 160_000].map(|until| {
                 while sampler.evaluations() < until {
                     sampler.advance(&toy, slice, Some(until));
                 }
                 let development = sampler.develop();
                 bits(&development.image, &development.learnt.normalisers.ln_z, sampler.evaluations())
             });
-            for ([until, next], stop) in [[1, 700], [700, 5_000], [5_000, 11_111]].into_iter().zip(&stops) {
+            for ([until, next], stop) in [[1, 5_600], [5_600, 40_000], [40_000, 88_888]].into_iter().zip(&stops) {
                 assert!((until..next).contains(&stop.2), "{} for {until}", stop.2);
             }
             stops
