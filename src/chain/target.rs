@@ -48,6 +48,11 @@ pub trait Target: Sync {
         false
     }
 
+    /// Whether some of them are had by open points alone, so that there must be such points.
+    fn needs_open_points(&self) -> bool {
+        false
+    }
+
     /// Lists all outcomes of the proposals of all lanes that do not rest in `out.outcomes`, with whatever the lanes choose
     /// left open. What outcomes contribute sums to what points contribute on average over their choices, and those of
     /// one lane are as many samples of what points are, each of weight `chance`, darkness making up for what these lack of 1
@@ -66,6 +71,10 @@ impl Target for Mapping<'_> {
 
     fn has_outcomes(&self) -> bool {
         Mapping::has_outcomes(self)
+    }
+
+    fn needs_open_points(&self) -> bool {
+        self.views_left_open()
     }
 
     fn evaluate_open(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut Self::Workspace) {

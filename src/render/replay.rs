@@ -78,7 +78,7 @@ pub fn find(
     stop: &AtomicBool,
 ) -> Result<Option<Evaluation>, RenderError> {
     let widths = Widths { camera: Width::W8, bounce: Width::W8, shadow: Width::W8 };
-    let mapping = settings.mapping(scene, mapping, widths);
+    let mapping = settings.mapping(scene, mapping, widths, settings.mutations_per_pixel);
     match address.drawn {
         Some(origin) => Ok(draw(&mapping, Rng::new(settings.seed), address.counter, origin)),
         None => repeat(mapping.watching(address.counter), settings, address.counter.step, stop),

@@ -136,8 +136,9 @@ pub fn run_on(
         PacketChoice::Fixed(width) => Widths { camera: width, bounce: width, shadow: width },
     };
     let film = job.scene.film;
+    let planned = before.as_ref().map_or(settings.mutations_per_pixel, |before| before.planned_mutations_per_pixel);
     let stage = Stage {
-        mapping: settings.mapping(job.scene, mapping, widths),
+        mapping: settings.mapping(job.scene, mapping, widths, planned),
         footprint: Footprint::new(film.filter, film.width, film.height),
         rng: Rng::new(settings.seed),
     };
@@ -153,7 +154,7 @@ pub fn run_on(
         scene_digest,
         arithmetic: job.scene.tracer.device().arithmetic(),
         sheet: stage.sheet(),
-        planned: before.as_ref().map_or(settings.mutations_per_pixel, |before| before.planned_mutations_per_pixel),
+        planned,
     };
     let mut watch = Watch { clock, set_up: SetUp::default(), last_round: None };
     if let Some(Header { done, last_round, .. }) = before {
@@ -624,6 +625,7 @@ mod tests {
                 &scene,
                 MappingKind::Unidirectional,
                 Widths { camera: Width::W1, bounce: Width::W1, shadow: Width::W1 },
+                None,
             ),
             footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
             rng: Rng::new(0),

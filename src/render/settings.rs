@@ -287,11 +287,26 @@ impl Settings {
         }
     }
 
-    /// The mapping of a scene as the method needs it.
-    pub fn mapping<'s>(&self, scene: &'s Scene, kind: MappingKind, widths: Widths) -> Mapping<'s> {
+    /// The mapping of a scene as the method needs it, in a run that was planned for so many mutations per pixel.
+    pub fn mapping<'s>(
+        &self,
+        scene: &'s Scene,
+        kind: MappingKind,
+        widths: Widths,
+        planned: Option<f64>,
+    ) -> Mapping<'s> {
+        let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
         // the images of single rungs have what their own states find, and nothing of open points
-        let balanced = self.method == Method::ReplicaExchange && self.combine == Combine::Balance && !self.layers;
-        Mapping::new(scene, kind, widths).with_technique_changes(self.technique_changes).with_views_left_open(balanced)
+        let views_left_open = self.leaves_open(planned, pixels) && !self.layers;
+        Mapping::new(scene, kind, widths)
+            .with_technique_changes(self.technique_changes)
+            .with_views_left_open(views_left_open)
+    }
+
+    /// Whether stratified points leave [open](Choices::opens) what they choose, where they choose.
+    pub fn leaves_open(&self, planned: Option<f64>, pixels: u64) -> bool {
+        let evaluations = self.parts.mutations(planned, pixels);
+        self.method == Method::ReplicaExchange && self.ladder_choices().opens(evaluations, pixels)
     }
 
     /// The inverse temperatures that were asked for by number; none where relt places them.

@@ -73,11 +73,10 @@ const FLOOR: f64 = 0.5;
 /// such points and gets it only where there are mirrors or clear glass (without, it has twelve times the squared error of
 /// `light` on `lattice`; relt study scenes/studies/mappings.toml).
 fn of_all_techniques(scene: &Scene, settings: &Settings, pixels: u64) -> MappingKind {
-    let evaluations = settings.parts.mutations(settings.mutations_per_pixel, pixels);
     let cheap = match settings.method {
         Method::Path => false,
         Method::Mlt => scene.features.delta_lobes,
-        Method::ReplicaExchange => settings.ladder_choices().opens(evaluations, pixels),
+        Method::ReplicaExchange => settings.leaves_open(settings.mutations_per_pixel, pixels),
     };
     if cheap { MappingKind::Multiplexed } else { MappingKind::Bidirectional }
 }

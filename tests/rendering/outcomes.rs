@@ -2,6 +2,7 @@
 
 use relt::embree::Width;
 use relt::path::{Contributions, Mapping, MappingKind, Outcome, Workspace};
+use relt::render::{Combine, Method, Settings};
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{Move, PixelOrder, Points, Proposals};
 use relt::scene::Scene;
@@ -184,6 +185,25 @@ fn light_in_plain_view_is_left_to_looks() {
 }
 
 const PASSES: usize = 200;
+
+/// What only open points find is left to them where there are any, and where no image is made without them.
+#[test]
+fn views_are_left_to_open_points_only_where_there_are_any() {
+    let scene = own("caustic", &[("res", "16")]);
+    let left = |settings: Settings, planned: Option<f64>| {
+        let mapping = settings.mapping(&scene, MappingKind::Multiplexed, fixed_widths(Width::W8), planned);
+        mapping.views_left_open()
+    };
+    assert!(left(Settings::default(), None) && left(Settings::default(), Some(1000.0)));
+    assert!(!left(Settings::default(), Some(16.0)), "too short a run");
+    assert!(!left(Settings { method: Method::Path, ..Settings::default() }, None));
+    assert!(!left(Settings { method: Method::Mlt, ..Settings::default() }, None));
+    assert!(!left(Settings { layers: true, ..Settings::default() }, None));
+    assert!(!left(Settings { combine: Combine::Power, ..Settings::default() }, None));
+    let unidirectional =
+        Settings::default().mapping(&scene, MappingKind::Unidirectional, fixed_widths(Width::W8), None);
+    assert!(!unidirectional.views_left_open(), "points that choose nothing");
+}
 
 #[test]
 fn other_mappings_have_one_outcome() {

@@ -320,9 +320,11 @@ impl<W: Default + Send> Sampler<W> {
     /// sliced.
     ///
     /// # Panics
-    /// If the target contributes elsewhere than where its points lie and the set-up did not say so.
+    /// If the target contributes elsewhere than where its points lie and the set-up did not say so, or needs open points and there are
+    /// none.
     pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, until: Option<u64>) -> u64 {
         assert!(self.screen.elsewhere || !target.splats_elsewhere(), "no layers for what points contribute elsewhere");
+        assert!(self.state.round.open || !target.needs_open_points(), "what only open points find would be missing");
         let learning = self.learning();
         let until = until.unwrap_or(u64::MAX);
         self.take_up_own();
