@@ -88,7 +88,7 @@ impl Variances {
             let odds = ((u * cost_t) / (t * cost_u)).sqrt();
             // all the variance on one side gives no odds
             let share = if odds.is_finite() { odds / (1.0 + odds) } else { most };
-            let share = share.clamp(*shares.start(), most.min(MOST_WITH_CHAINS));
+            let share = share.min(most.min(MOST_WITH_CHAINS)).max(*shares.start());
             let error = (u / share + t / (1.0 - share)) * (share * cost_u + (1.0 - share) * cost_t) / path;
             if error < best.relative_error {
                 best = Choice { ratio, share, relative_error: error };
@@ -234,6 +234,17 @@ mod tests {
         let choice = |rounds: &[Variances]| Variances::pooled(rounds).choose([1.0; 2], &(0.0..=1.0), 0.5).ratio;
         assert_eq!(choice(std::slice::from_ref(&stuck)), 0.0, "alone it would");
         assert!(choice(&[good.clone(), good, stuck]) > 0.0);
+    }
+
+    /// A round that has to see every pixel may need more uniform points than chains with any say leave.
+    #[test]
+    fn the_least_share_goes_before_the_most() {
+        let mut round = round(0.01, 1e-6);
+        round.0[0][0] = 1.0;
+        for shares in [0.99..=1.0, 0.99..=0.99, 0.0..=0.5] {
+            let choice = round.choose([1.0; 2], &shares, 0.5);
+            assert!(choice.ratio > 0.0 && shares.contains(&choice.share), "{choice:?} of {shares:?}");
+        }
     }
 
     #[test]
