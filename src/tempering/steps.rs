@@ -5,11 +5,10 @@ use serde::{Deserialize, Serialize};
 use crate::sample::StepLaw;
 
 /// Number of scales in the bank.
-pub const SCALES: usize = 8;
+pub const SCALES: usize = 6;
 
-/// The scales, smallest first: log-uniform step sizes over a factor of four each, together 2⁻¹⁷ to 1/2. One scale
-/// fails where a target has features of many sizes, and which is best differs from rung to rung. (With 2⁻¹³ as the smallest, chains
-/// that had found a lamp by way of glass and a wall on `caustic` refused thousands of steps in a row.)
+/// The scales, smallest first: log-uniform step sizes over a factor of four each, together 2⁻¹³ to 1/2. One scale
+/// fails where a target has features of many sizes, and which is best differs from rung to rung.
 pub fn bank() -> [StepLaw; SCALES] {
     std::array::from_fn(|i| {
         let [smallest, largest] = bounds(i);
@@ -19,12 +18,14 @@ pub fn bank() -> [StepLaw; SCALES] {
 
 /// Smallest and largest step of a scale, as fractions of the unit interval.
 fn bounds(scale: usize) -> [f32; 2] {
-    [-0.5, 0.5].map(|half| size(scale as f64 + half) as f32)
+    let largest = 2f32.powi(2 * (scale as i32 + 1) - 13);
+    [largest / 4.0, largest]
 }
 
-/// Geometric centre of the step sizes of scale number `scale`, which may lie between two, as a fraction of the unit interval.
-pub fn size(scale: f64) -> f64 {
-    libm::exp2(2.0 * (scale - SCALES as f64))
+/// Geometric centre of a scale's step sizes, as a fraction of the unit interval.
+pub fn size(scale: usize) -> f64 {
+    let [smallest, largest] = bounds(scale).map(f64::from);
+    (smallest * largest).sqrt()
 }
 
 /// Steps of one scale on one rung, mergeable by addition in any order.
@@ -75,8 +76,8 @@ pub struct StepMix {
 }
 
 /// The centre of Kelemen's sizes, 1/1024 to 1/64, in scales.
-pub const KELEMEN: f64 = 4.0;
-/// Standard deviation of the bell, in scales: about a centre of 4, some three quarters of the steps have Kelemen's sizes.
+pub const KELEMEN: f64 = 2.0;
+/// Standard deviation of the bell, in scales: about a centre of 2, some three quarters of the steps have Kelemen's sizes.
 const WIDTH: f64 = 0.75;
 /// Least weight of a scale, before all are scaled to sum to one: so all stay known.
 const TRIAL: f64 = 0.01;
@@ -84,7 +85,7 @@ const TRIAL: f64 = 0.01;
 const FEWEST: u64 = 256;
 
 impl StepMix {
-    /// Weights ∝ exp(−(i − centre)²/(2 · 0.75²)) for scale i, none below 1 %; 0 ≤ centre ≤ 7 (others count as the nearest).
+    /// Weights ∝ exp(−(i − centre)²/(2 · 0.75²)) for scale i, none below 1 %; 0 ≤ centre ≤ 5 (others count as the nearest).
     pub fn about(centre: f64) -> StepMix {
         let centre = centre.clamp(0.0, (SCALES - 1) as f64);
         let bell = |i: usize| libm::exp(-0.5 * ((i as f64 - centre) / WIDTH).powi(2));
@@ -152,24 +153,20 @@ mod tests {
     #[test]
     fn the_bell_has_kelemens_sizes_in_its_middle_and_forgets_no_scale() {
         let w = *StepMix::about(KELEMEN).weights();
-        let middle = KELEMEN as usize;
-        assert!(
-            w[middle] > 0.4 && (w[middle - 1] - w[middle + 1]).abs() < 1e-12 && w.iter().all(|w| *w > 0.5 * TRIAL),
-            "{w:?}"
-        );
+        assert!(w[2] > 0.4 && (w[1] - w[3]).abs() < 1e-12 && w.iter().all(|w| *w > 0.5 * TRIAL), "{w:?}");
         assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn hotter_rungs_take_steps_of_the_same_acceptance() {
-        let target = counts([1.0, 0.95, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1]);
-        let hotter = counts([1.0, 1.0, 0.98, 0.95, 0.9, 0.7, 0.5, 0.3]);
-        assert_eq!(StepMix::centre_of_equal_acceptance(4.0, &target, &target), 4.0);
-        let centre = StepMix::centre_of_equal_acceptance(4.0, &target, &hotter);
-        assert!((centre - 5.5).abs() < 1e-5, "{centre}");
+        let target = counts([0.9, 0.8, 0.6, 0.4, 0.2, 0.1]);
+        let hotter = counts([0.98, 0.95, 0.9, 0.7, 0.5, 0.3]);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &target), 2.0);
+        let centre = StepMix::centre_of_equal_acceptance(2.0, &target, &hotter);
+        assert!((centre - 3.5).abs() < 1e-5, "{centre}");
         let all = counts([1.0; SCALES]);
-        assert_eq!(StepMix::centre_of_equal_acceptance(4.0, &target, &all), (SCALES - 1) as f64);
-        assert_eq!(StepMix::centre_of_equal_acceptance(4.0, &target, &[StepCount::default(); SCALES]), 4.0);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &all), (SCALES - 1) as f64);
+        assert_eq!(StepMix::centre_of_equal_acceptance(2.0, &target, &[StepCount::default(); SCALES]), 2.0);
     }
 
     #[test]
@@ -190,7 +187,7 @@ mod tests {
             assert_eq!(bounds(i)[0], bounds(i - 1)[1]);
         }
         assert_eq!(bounds(SCALES - 1)[1], 0.5);
-        assert!((size(KELEMEN) - 2f64.powi(-8)).abs() < 1e-12);
+        assert!((size(2) - 2f64.powi(-8)).abs() < 1e-12);
         assert_eq!(bank().len(), SCALES);
     }
 }

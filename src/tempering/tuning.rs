@@ -58,16 +58,16 @@ pub struct Choice {
 pub struct Variances([[f64; 2]; RATIOS.len()]);
 
 impl Variances {
-    /// Geometric means over rounds, each of which counts the same; of values that a round has not measured (0) those of the
-    /// others.
+    /// Geometric means over rounds, each with the weight beside it; of values that a round has not measured (0) those of the others.
     ///
     /// Both are sums of squares that a few bright paths decide, and a chain that is stuck for a part of one round is a hundred
     /// times as much as all others: means would be those of the worst round.
-    pub fn pooled(rounds: &[Variances]) -> Variances {
+    pub fn pooled(rounds: &[(f64, Variances)]) -> Variances {
         let mean = |ratio: usize, of: usize| {
-            let known = rounds.iter().map(|round| round.0[ratio][of]).filter(|variance| *variance > 0.0);
-            let (sum, count) = known.fold((0.0, 0), |(sum, count), variance| (sum + libm::log(variance), count + 1));
-            if count == 0 { 0.0 } else { libm::exp(sum / f64::from(count)) }
+            let known = rounds.iter().map(|(weight, round)| (weight, round.0[ratio][of])).filter(|(_, v)| *v > 0.0);
+            let (sum, all) =
+                known.fold((0.0, 0.0), |(sum, all), (weight, v)| (sum + weight * libm::log(v), all + weight));
+            if all == 0.0 { 0.0 } else { libm::exp(sum / all) }
         };
         Variances(std::array::from_fn(|ratio| [0, 1].map(|of| mean(ratio, of))))
     }
@@ -231,9 +231,9 @@ mod tests {
             round.0[0][0] = 1.0;
             round
         });
-        let choice = |rounds: &[Variances]| Variances::pooled(rounds).choose([1.0; 2], &(0.0..=1.0), 0.5).ratio;
-        assert_eq!(choice(std::slice::from_ref(&stuck)), 0.0, "alone it would");
-        assert!(choice(&[good.clone(), good, stuck]) > 0.0);
+        let choice = |rounds: &[(f64, Variances)]| Variances::pooled(rounds).choose([1.0; 2], &(0.0..=1.0), 0.5).ratio;
+        assert_eq!(choice(&[(4.0, stuck.clone())]), 0.0, "alone it would");
+        assert!(choice(&[(1.0, good.clone()), (2.0, good), (4.0, stuck)]) > 0.0);
     }
 
     /// A round that has to see every pixel may need more uniform points than chains with any say leave.
@@ -249,8 +249,8 @@ mod tests {
 
     #[test]
     fn rounds_that_saw_nothing_are_left_out() {
-        let [u, t] = Variances::pooled(&[round(4.0, 0.0), round(0.0, 9.0), round(1.0, 1.0)]).0[3];
-        assert!((u - 2.0).abs() < 1e-12 && (t - 3.0).abs() < 1e-12, "{u} {t}");
-        assert_eq!(Variances::pooled(&[round(0.0, 0.0)]), round(0.0, 0.0));
+        let [u, t] = Variances::pooled(&[(1.0, round(8.0, 0.0)), (1.0, round(0.0, 9.0)), (2.0, round(1.0, 1.0))]).0[3];
+        assert!((u - 2.0).abs() < 1e-12 && (t - 9f64.cbrt()).abs() < 1e-12, "{u} {t}");
+        assert_eq!(Variances::pooled(&[(1.0, round(0.0, 0.0))]), round(0.0, 0.0));
     }
 }

@@ -85,8 +85,8 @@ struct State {
     ladders_a_block: usize,
     /// Weights and shares of the round.
     choice: Choice,
-    /// What each round has measured of the errors of points and of states.
-    variances: Vec<Variances>,
+    /// What each round has measured of the errors of points and of states, and its evaluations.
+    variances: Vec<(f64, Variances)>,
     /// Whether uniform points leave chains anything to gain, as far as is known before there are any.
     promising: bool,
     /// Centre of the sizes of steps on the target, in scales of the bank.

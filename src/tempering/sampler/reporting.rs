@@ -132,7 +132,7 @@ impl<W: Default + Send> Sampler<W> {
     fn scale_reports(&self, k: usize, counts: &RungCounts) -> Vec<ScaleReport> {
         let weights = self.state.round.mixes[TRIALS / 2][k].weights();
         let report = |i: usize| ScaleReport {
-            size: steps::size(i as f64),
+            size: steps::size(i),
             weight: weights[i],
             acceptance: counts.steps[i].acceptance(),
             proposed: counts.steps[i].proposed,

@@ -309,7 +309,7 @@ impl<W: Default + Send> Sampler<W> {
         Some(format!(
             "{} steps, of about 2^{:.0}: {:.2} times the noise",
             if best < UNSHIFTED { "shorter" } else { "longer" },
-            libm::log2(steps::size(self.state.centre)),
+            2.0 * self.state.centre - 12.0,
             noise[best] / noise[UNSHIFTED]
         ))
     }
@@ -363,7 +363,8 @@ impl<W: Default + Send> Sampler<W> {
 
     /// The weights and the share that serve best, where they are free.
     fn tune(&mut self, measured: &Measured, last: bool) -> Choice {
-        self.state.variances.push(measured.variances());
+        // longer rounds see more of how states hang together
+        self.state.variances.push((self.state.schedule.evaluations as f64, measured.variances()));
         let variances = Variances::pooled(&self.state.variances);
         let grace = if self.state.promising { ROUNDS_OF_GRACE } else { ROUNDS_OF_LITTLE_PROMISE };
         // while chains are to show what they can do they keep a part of the work, less in each round
