@@ -19,7 +19,7 @@ const MOST_TEXELS_ACROSS: u32 = 65_536;
 const MOST_MEMORY: u64 = 4 << 30;
 
 /// Texels that a byte of a file may stand for: PNG's compression makes up to 1032 bytes of one, with eight black or white texels
-/// each; JPEG and HDR stay far below. What a decoder makes up for files that end too soon is not theirs.
+/// each; JPEG and HDR stay below. What a decoder makes up for files that end too soon is not theirs.
 const TEXELS_OF_BYTE: u64 = 8 * 1032;
 /// Texels that any file may have.
 const TEXELS_OF_ANY: u64 = 1 << 24;
