@@ -210,10 +210,13 @@ struct Run<'s> {
 impl<'s> Run<'s> {
     /// In full swing, on the current threads.
     fn new(mapping: Mapping<'s>, settings: &Settings, smoke: bool) -> Run<'s> {
-        let stage = stage(mapping);
+        let mut stage = stage(mapping);
         let open = u64::from(stage.mapping.has_outcomes()) * OPEN_FROM * stage.pixels();
         let planned = if smoke { 1 << 14 } else { PLANNED.max(open) };
         let ladders = settings.method == Method::ReplicaExchange;
+        let a_pixel = ladders.then_some(planned as f64 / stage.pixels() as f64);
+        let mapping = &stage.mapping;
+        stage.mapping = settings.mapping(mapping.scene(), mapping.kind(), mapping.widths(), a_pixel);
         let mut engine = render::engine(&stage, settings, ladders.then_some(planned));
         engine.set_wanted(None);
         while ladders && !smoke && engine.phase() != Phase::Steady {
@@ -243,7 +246,8 @@ impl<'s> Run<'s> {
 
     /// The rays of its next sweep, and how many mutations they are of.
     fn record(&mut self) -> (RecordedRays, f64) {
-        let mapping = Mapping::new(self.stage.mapping.scene(), self.stage.mapping.kind(), self.stage.mapping.widths());
+        let own = &self.stage.mapping;
+        let mapping = Mapping::new(own.scene(), own.kind(), own.widths()).with_views_left_open(own.views_left_open());
         let stage = stage(mapping.recording());
         let begin = self.engine.counts();
         while self.engine.advance(&stage, 1, None) == 0 {}

@@ -28,7 +28,7 @@ use criterion::{
 };
 use relt::embree::{Hits, Rays, Width};
 use relt::film::Footprint;
-use relt::path::{Mapping, MappingKind, Widths};
+use relt::path::{MappingKind, Widths};
 use relt::render::calibration::{LANES, record_rays};
 use relt::render::engine::{Engine, Stage};
 use relt::render::{self, LadderChoice, Method, MltSettings, Normalisation, Settings};
@@ -143,8 +143,10 @@ fn runs() -> Vec<Run> {
 
 impl Run {
     fn measure(&mut self, bencher: &mut Bencher, scene: &Scene, widths: Widths) {
+        let [width, height] = [scene.film.width, scene.film.height].map(f64::from);
+        let planned = is_smoke_test().then_some(SMOKE as f64 / (width * height));
         let stage = Stage {
-            mapping: Mapping::new(scene, self.mapping, widths),
+            mapping: self.settings.mapping(scene, self.mapping, widths, planned),
             footprint: Footprint::new(scene.film.filter, scene.film.width, scene.film.height),
             rng: Rng::new(self.settings.seed),
         };
