@@ -29,7 +29,8 @@ const SHORTEST_CHAIN: u64 = 512;
 ///
 /// Few, because what chains start from is not enough for many: the bootstrap has some hundred samples that matter, and
 /// chains forget them only after thousands of sweeps. relMSE times mutations on `lattice` after 12 to 22 M mutations with
-/// 8, 16, 32, 64, 256 lanes in each of 64 blocks: 2.0, 2.0, 2.7, 3.0, 4.1 M. Packets of rays want more than 8.
+/// 8, 16, 32, 64, 256 lanes in each of 64 blocks: 2.0, 2.0, 2.7, 3.0, 4.1 M. Packets of rays want more: they are filled by
+/// several blocks together.
 const LANES_OF_LADDERS: usize = 16;
 /// Sweeps that a ladder should go through; at 128 mutations per pixel, relMSE of `lattice` is 0.64, 0.28, 0.25 with 512,
 /// 2048 and 8192 (`relt render --replicas 3 --mpp 128`, median of seeds 1 to 3, this constant changed).

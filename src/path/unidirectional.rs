@@ -36,8 +36,8 @@ pub(super) struct Arrays {
     shadow_rays: Rays,
     shadow_contributions: Vec<Rgb>,
     occluded: Vec<bool>,
-    /// Vertices that are shaded side by side.
-    group: Box<side_by_side::Group>,
+    /// Vertices that are shaded side by side; there from the first time on that there are any, but while they are lent out.
+    group: Option<Box<side_by_side::Group>>,
 }
 
 impl Arrays {

@@ -29,7 +29,8 @@ use crate::{
 ///
 /// Lanes are the replicas, ladder by ladder, and behind them the offers, ladder by ladder. They are cut into *parts* of
 /// a batch each: one where ladders are short, several where a ladder is longer than a batch. Parts explore side by side,
-/// also on several threads; swaps go between them.
+/// also on several threads; swaps go between them. Several blocks of one part each may go through sweeps
+/// [together](Crew), as one batch.
 ///
 /// Ranks may [share](Block::share) a block: each then has some of its replicas and some of its offers, and all know on which
 /// rung every replica is. After each exploration they tell one another the ln g of their states and the points that they
@@ -43,7 +44,13 @@ pub struct Block<W> {
     chains: usize,
     offers: usize,
     lanes_a_part: usize,
-    parts: Vec<Part<W>>,
+    rng: Rng,
+    /// Size of the film of the stratified points that chains start from.
+    film: [u32; 2],
+    importance: Option<Arc<Importance>>,
+    parts: Vec<Part>,
+    /// Chains of each part; lent to the crew while there is one.
+    batches: Vec<Batch<W>>,
     /// The ranks that share the block, and which replicas and which offers are this one's.
     group: Group,
     own_replicas: Range<usize>,
@@ -60,13 +67,23 @@ pub struct Block<W> {
     sweeps: u64,
 }
 
-/// A batch of lanes: replicas that follow one another first, then offers.
-struct Part<W> {
-    /// Lane of its first replica.
+/// Chains, and what they are evaluated with: of a part, or of several blocks.
+struct Batch<W> {
+    walkers: Walkers,
+    /// Replicas come first among its lanes, then offers.
+    evaluator: Evaluator<W>,
+    /// Inverse temperatures of the replicas, where techniques are changed.
+    betas: Vec<f64>,
+}
+
+/// Replicas that follow one another, and offers, all of a batch.
+struct Part {
+    /// Number of its first replica in the block.
     first: usize,
     replicas: usize,
-    walkers: Walkers,
-    evaluator: Evaluator<W>,
+    offers: usize,
+    /// Where its replicas and its offers begin among the lanes of the batch.
+    seat: [usize; 2],
     tally: Tally,
     /// Steps in a row that each chain refused.
     refused: Vec<u32>,
@@ -165,7 +182,11 @@ impl<W: Default + Send> Block<W> {
             chains,
             offers,
             lanes_a_part,
+            rng,
+            film,
+            importance: None,
             parts: Vec::new(),
+            batches: Vec::new(),
             group: Group::alone(),
             own_replicas: 0..0,
             own_offers: 0..0,
@@ -176,26 +197,22 @@ impl<W: Default + Send> Block<W> {
             index: (first_ladder == 0).then(IndexProcess::default),
             sweeps: 0,
         };
-        block.cut(rng, film, layers, None);
+        block.cut(layers);
         block
     }
 
     /// Cuts the lanes that are worked on here into parts, all without states.
-    fn cut(&mut self, rng: Rng, film: [u32; 2], layers: usize, importance: Option<Arc<Importance>>) {
+    fn cut(&mut self, layers: usize) {
         let (replicas, offers) = (self.rung.len(), self.ladders * self.offers);
         let [own_replicas, own_offers] = [replicas, offers].map(|lanes| self.group.own(lanes));
         let lanes: Vec<usize> = own_replicas.clone().chain(own_offers.clone().map(|i| replicas + i)).collect();
         let part = |(number, lanes): (usize, &[usize])| {
-            let first = (own_replicas.start + number * self.lanes_a_part).min(own_replicas.end);
             let own = lanes.iter().filter(|lane| **lane < replicas).count();
-            let mut evaluator = Evaluator::new(rng, lanes.iter().map(|lane| self.counter(*lane)).collect());
-            evaluator.film = film; // of the stratified points that chains start from
-            evaluator.importance = importance.clone();
             Part {
-                first,
+                first: (own_replicas.start + number * self.lanes_a_part).min(own_replicas.end),
                 replicas: own,
-                walkers: Walkers::new(own),
-                evaluator,
+                offers: lanes.len() - own,
+                seat: [0, own],
                 tally: Tally::new(self.chains + 1, layers),
                 refused: vec![0; own],
                 scale: vec![0; own],
@@ -204,17 +221,27 @@ impl<W: Default + Send> Block<W> {
         };
         // one part at least, for what is seen of swaps
         let parts: Vec<&[usize]> = if lanes.is_empty() { vec![&[]] } else { lanes.chunks(self.lanes_a_part).collect() };
+        let batch = |lanes: &&[usize]| self.batch(lanes.iter().map(|lane| self.counter(*lane)).collect());
+        let batches = parts.iter().map(batch).collect();
         self.parts = parts.into_iter().enumerate().map(part).collect();
+        self.batches = batches;
+        self.parts.iter().zip(&mut self.batches).for_each(|(part, batch)| batch.walkers = Walkers::new(part.replicas));
         (self.own_replicas, self.own_offers) = (own_replicas, own_offers);
         let of_rank = |rank: usize| (0..self.group.of(rank, offers).len()).map(move |at| (rank, at));
         self.told.place = (0..self.group.count()).flat_map(of_rank).collect();
     }
 
+    /// A batch with those lanes, without chains.
+    fn batch(&self, counters: Vec<Counter>) -> Batch<W> {
+        let mut evaluator = Evaluator::new(self.rng, counters);
+        evaluator.film = self.film;
+        evaluator.importance = self.importance.clone();
+        Batch { walkers: Walkers::new(0), evaluator, betas: Vec::new() }
+    }
+
     /// Cuts it anew, with all that it is at.
     fn cut_anew(&mut self, saved: SavedBlock) {
-        let Evaluator { film, importance, .. } = &self.parts[0].evaluator;
-        let (film, importance) = (*film, importance.clone());
-        self.cut(self.rng(), film, self.parts[0].tally.splats.layers(), importance);
+        self.cut(self.parts[0].tally.splats.layers());
         self.restore(saved).expect("its own state");
     }
 
@@ -236,12 +263,12 @@ impl<W: Default + Send> Block<W> {
     /// All that there is to save between sweeps; of a block that is shared, what this rank has of it.
     pub fn saved(&self) -> SavedBlock {
         let mut faults = Faults::default();
-        self.parts.iter().for_each(|part| faults.merge(&part.evaluator.out.faults));
+        self.batches.iter().for_each(|batch| faults.merge(&batch.evaluator.out.faults));
         SavedBlock {
-            walkers: Walkers::joined(self.parts.iter().map(|part| &part.walkers)),
+            walkers: Walkers::joined(self.batches.iter().map(|batch| &batch.walkers)),
             refused: self.parts.iter().flat_map(|part| &part.refused).copied().collect(),
             tally: self.seen(),
-            rays: self.parts.iter().map(|part| part.evaluator.out.rays).sum(),
+            rays: self.batches.iter().map(|batch| batch.evaluator.out.rays).sum(),
             faults,
             rung: self.rung.clone(),
             trips: self.trips.clone(),
@@ -262,15 +289,15 @@ impl<W: Default + Send> Block<W> {
         let SavedBlock { walkers, refused, tally, rays, faults, rung, trips, index, sweeps } = saved;
         expect(index.is_some() == self.index.is_some(), "ladders")?;
         expect(walkers.fits(self.own_replicas.len()) && refused.len() == self.own_replicas.len(), "chains")?;
-        for part in &mut self.parts {
+        for (part, batch) in self.parts.iter_mut().zip(&mut self.batches) {
             let first = part.first - self.own_replicas.start;
             let own = first..first + part.replicas;
-            part.walkers = walkers.some(own.clone());
+            batch.walkers = walkers.some(own.clone());
             part.refused.copy_from_slice(&refused[own]);
         }
-        let first = &mut self.parts[0];
-        first.tally.restore(tally)?;
-        (first.evaluator.out.rays, first.evaluator.out.faults) = (rays, faults);
+        self.parts[0].tally.restore(tally)?;
+        let out = &mut self.batches[0].evaluator.out;
+        (out.rays, out.faults) = (rays, faults);
         expect(rung.len() == self.rung.len() && trips.fits(rung.len(), self.chains), "replicas")?;
         let mut replica_on = vec![u16::MAX; rung.len()];
         for (lane, k) in rung.iter().enumerate() {
@@ -317,10 +344,6 @@ impl<W: Default + Send> Block<W> {
         self.parts.iter_mut().for_each(|part| part.tally.forget());
     }
 
-    fn rng(&self) -> Rng {
-        self.parts[0].evaluator.rng()
-    }
-
     /// The counter of a lane: replicas are numbered from 0, offers behind them.
     fn counter(&self, lane: usize) -> Counter {
         let replicas = self.rung.len();
@@ -347,31 +370,36 @@ impl<W: Default + Send> Block<W> {
         self.ladders * (self.chains + self.offers)
     }
 
-    /// Part of a replica, and its place there, where it is this rank's.
+    /// Part of a replica, and its lane in the batch, where it is this rank's.
     fn place(&self, replica: usize) -> Option<(usize, usize)> {
         let own = self.own_replicas.contains(&replica);
-        own.then(|| replica - self.own_replicas.start).map(|slot| (slot / self.lanes_a_part, slot % self.lanes_a_part))
+        own.then(|| {
+            let slot = replica - self.own_replicas.start;
+            let part = slot / self.lanes_a_part;
+            (part, self.parts[part].seat[0] + slot % self.lanes_a_part)
+        })
     }
 
     /// The same of an offer, where there is one rank alone.
     fn place_of_offer(&self, offer: usize) -> (usize, usize) {
         let slot = self.rung.len() + offer;
-        (slot / self.lanes_a_part, slot % self.lanes_a_part)
+        let part = slot / self.lanes_a_part;
+        (part, self.parts[part].seat[1] + slot % self.lanes_a_part - self.parts[part].replicas)
     }
 
     /// ln g of a replica's state.
-    fn ln_g(&self, replica: usize) -> f64 {
+    fn ln_g(&self, batches: &[Batch<W>], replica: usize) -> f64 {
         match self.place(replica).filter(|_| self.group.is_alone()) {
-            Some((part, at)) => self.parts[part].walkers.states[at].ln_g,
+            Some((part, at)) => batches[part].walkers.states[at].ln_g,
             None => self.told.ln_g[replica],
         }
     }
 
     /// ln g of an offered point.
-    fn ln_offered(&self, offer: usize) -> f64 {
+    fn ln_offered(&self, batches: &[Batch<W>], offer: usize) -> f64 {
         if self.group.is_alone() {
             let (part, at) = self.place_of_offer(offer);
-            return self.parts[part].evaluator.out.lanes[at].ln_g;
+            return batches[part].evaluator.out.lanes[at].ln_g;
         }
         let (rank, at) = self.told.place[offer];
         self.told.offered[rank].1.lanes[at].ln_g
@@ -379,7 +407,13 @@ impl<W: Default + Send> Block<W> {
 
     /// Scalar contributions are weighed by this importance, if there is any; from before the first state on.
     pub fn set_importance(&mut self, importance: Option<&Arc<Importance>>) {
-        self.parts.iter_mut().for_each(|part| part.evaluator.importance = importance.cloned());
+        self.importance = importance.cloned();
+        self.batches.iter_mut().for_each(|batch| batch.evaluator.importance = importance.cloned());
+    }
+
+    /// Whether it may go through sweeps [together](Crew) with others: it is one part, and this rank's alone.
+    pub fn can_join(&self) -> bool {
+        self.parts.len() == 1 && self.group.is_alone()
     }
 
     /// Puts the chains into states: `starts[k - 1]` has one for rung k of every ladder of the block.
@@ -390,47 +424,72 @@ impl<W: Default + Send> Block<W> {
             let (ladder, replica) = (lane / self.chains, lane % self.chains);
             starts[replica][(ladder + replica * self.ladders.div_ceil(self.chains)) % self.ladders]
         };
-        for part in &mut self.parts {
+        for (part, Batch { walkers, evaluator, .. }) in self.parts.iter().zip(&mut self.batches) {
             let starts: Vec<Start> = (part.first..part.first + part.replicas).map(of_lane).collect();
-            replay(target, &starts, &mut part.walkers, &mut part.evaluator);
+            replay(target, &starts, walkers, evaluator);
         }
     }
 
     /// Goes through `sweeps` sweeps.
     pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, canvas: &Canvas, round: &Round) {
-        let bank = steps::bank();
-        for _ in 0..sweeps {
-            let (rung, sweep, mixes) = (&self.rung, self.sweeps, &round.mixes[self.trial()]);
-            let explore = |part: &mut Part<W>| part.explore(target, canvas, round, (&bank, mixes), rung, sweep);
-            match &mut self.parts[..] {
-                [part] => explore(part),
-                parts => parts.par_iter_mut().for_each(explore),
+        Crew::new(vec![self]).advance(target, sweeps, canvas, round);
+    }
+
+    /// Moves all replicas and draws all offers, part by part.
+    fn explore<T: Target<Workspace = W>>(
+        &mut self,
+        batches: &mut [Batch<W>],
+        target: &T,
+        canvas: &Canvas,
+        round: &Round,
+        bank: &[StepLaw; SCALES],
+    ) {
+        let (rung, sweep, mixes) = (&self.rung, self.sweeps, &round.mixes[self.trial()]);
+        let explore = |(part, batch): (&mut Part, &mut Batch<W>)| {
+            if batch.evaluator.counters.is_empty() {
+                return;
             }
-            self.tell();
-            self.inject(canvas, round);
-            self.swap(canvas, round);
-            for (lane, k) in self.rung.iter().enumerate() {
-                self.trips.stays(lane, usize::from(*k));
+            if target.changes_techniques() {
+                part.warm(batch, round, rung, sweep);
+                batch.change_techniques(target);
+                part.settle_changes(batch, canvas, round, rung);
             }
-            if let Some(index) = &mut self.index {
-                index.note(&self.rung[..self.chains]);
-            }
-            self.sweeps += 1;
+            part.propose(batch, (bank, mixes), rung, sweep);
+            batch.evaluate(target);
+            part.settle(batch, canvas, round, rung, sweep);
+        };
+        match (&mut self.parts[..], batches) {
+            ([part], [batch]) => explore((part, batch)),
+            (parts, batches) => parts.par_iter_mut().zip(batches).for_each(explore),
         }
+    }
+
+    /// What follows once all replicas have moved.
+    fn exchange(&mut self, batches: &mut [Batch<W>], canvas: &Canvas, round: &Round) {
+        self.tell(batches);
+        self.inject(batches, canvas, round);
+        self.swap_neighbours(batches, canvas, round);
+        for (lane, k) in self.rung.iter().enumerate() {
+            self.trips.stays(lane, usize::from(*k));
+        }
+        if let Some(index) = &mut self.index {
+            index.note(&self.rung[..self.chains]);
+        }
+        self.sweeps += 1;
     }
 
     /// Tells the ranks that share the block how high this one's states are and which points it offers, and hears the same
     /// of theirs.
-    fn tell(&mut self) {
+    fn tell(&mut self, batches: &[Batch<W>]) {
         if self.group.is_alone() {
             return;
         }
         let mut offered = Walkers::new(self.own_offers.len());
         let mut ln_g = Vec::with_capacity(self.own_replicas.len());
         let mut to = 0;
-        for part in &self.parts {
-            ln_g.extend(part.walkers.states.iter().map(|state| state.ln_g));
-            let Evaluator { points, out, .. } = &part.evaluator;
+        for (part, Batch { walkers, evaluator, .. }) in self.parts.iter().zip(batches) {
+            ln_g.extend(walkers.states.iter().map(|state| state.ln_g));
+            let Evaluator { points, out, .. } = evaluator;
             for at in part.replicas..out.lanes.len() {
                 offered.replace(to, (points, at), out, &mut |_, _| ());
                 to += 1;
@@ -446,14 +505,14 @@ impl<W: Default + Send> Block<W> {
 
     /// Offers each fresh point to the lowest chain of its ladder, a swap that costs nothing.
     #[inline(never)] // profiles tell what it takes
-    fn inject(&mut self, canvas: &Canvas, round: &Round) {
-        let rng = self.rng();
+    fn inject(&mut self, batches: &mut [Batch<W>], canvas: &Canvas, round: &Round) {
+        let rng = self.rng;
         let replicas = self.rung.len();
         let lowest = round.ladder.betas()[1];
         for offer in 0..self.ladders * self.offers {
             let base = offer / self.offers * self.chains;
             let lane = base + usize::from(self.replica_on[base]);
-            let alpha = swap_acceptance(0.0, self.ln_offered(offer), lowest, self.ln_g(lane));
+            let alpha = swap_acceptance(0.0, self.ln_offered(batches, offer), lowest, self.ln_g(batches, lane));
             if let Some((part, _)) = self.place(lane) {
                 self.parts[part].tally.counts[1].swaps.add(alpha);
             }
@@ -463,42 +522,46 @@ impl<W: Default + Send> Block<W> {
             let counter = Counter { purpose: Purpose::Swap, ..self.counter(replicas + offer) };
             if open_unit_f64(rng.words(counter, 0)[0]) < alpha {
                 self.trips.renewed(lane);
-                self.take(lane, offer, canvas, round);
+                self.take(batches, lane, offer, canvas, round);
             }
         }
     }
 
     /// Puts the lowest chain of a ladder into an offered point.
-    fn take(&mut self, lane: usize, offer: usize, canvas: &Canvas, round: &Round) {
+    fn take(&mut self, batches: &mut [Batch<W>], lane: usize, offer: usize, canvas: &Canvas, round: &Round) {
         if !self.group.is_alone() {
-            self.told.ln_g[lane] = self.ln_offered(offer);
+            self.told.ln_g[lane] = self.ln_offered(batches, offer);
         }
         let Some((to, place)) = self.place(lane) else { return };
-        if !self.group.is_alone() {
-            let (rank, at) = self.told.place[offer];
-            let (points, out) = &self.told.offered[rank];
-            let Part { walkers, tally, .. } = &mut self.parts[to];
-            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
-            return walkers.replace(place, (points, at), out, &mut record);
+        let alone = self.group.is_alone();
+        let (from, at) = if alone { self.place_of_offer(offer) } else { self.told.place[offer] };
+        let tally = &mut self.parts[to].tally;
+        let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+        if !alone {
+            let (points, out) = &self.told.offered[from];
+            return batches[to].walkers.replace(place, (points, at), out, &mut record);
         }
-        let (from, at) = self.place_of_offer(offer);
         if from == to {
-            let Part { walkers, evaluator, tally, .. } = &mut self.parts[to];
-            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+            let Batch { walkers, evaluator, .. } = &mut batches[to];
             walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
         } else {
-            let parts = self.parts.get_disjoint_mut([from, to]).expect("two parts");
-            let [Part { evaluator, .. }, Part { walkers, tally, .. }] = parts;
-            let mut record = |state: Whole, w: f64| tally.state(canvas, round, 1, state, w);
+            let [Batch { evaluator, .. }, Batch { walkers, .. }] =
+                batches.get_disjoint_mut([from, to]).expect("two parts");
             walkers.replace(place, (&evaluator.points, at), &evaluator.out, &mut record);
         }
     }
 
-    /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones; a part of
-    /// [`advance`](Self::advance).
-    #[inline(never)] // profiles tell what it takes
+    /// Swaps neighbours; a part of [`advance`](Self::advance).
     pub fn swap(&mut self, canvas: &Canvas, round: &Round) {
-        let rng = self.rng();
+        let mut batches = std::mem::take(&mut self.batches);
+        self.swap_neighbours(&mut batches, canvas, round);
+        self.batches = batches;
+    }
+
+    /// Swaps neighbouring tempered rungs (1, 2), (3, 4), … in even sweeps and (2, 3), (4, 5), … in odd ones.
+    #[inline(never)] // profiles tell what it takes
+    fn swap_neighbours(&mut self, batches: &mut [Batch<W>], canvas: &Canvas, round: &Round) {
+        let rng = self.rng;
         let betas = round.ladder.betas();
         for ladder in 0..self.ladders {
             let base = ladder * self.chains;
@@ -507,7 +570,7 @@ impl<W: Default + Send> Block<W> {
                 let colder = hotter + 1;
                 let lanes = [hotter, colder].map(|k| base + usize::from(self.replica_on[base + k - 1]));
                 let places = lanes.map(|lane| self.place(lane));
-                let [h, c] = lanes.map(|lane| self.ln_g(lane));
+                let [h, c] = lanes.map(|lane| self.ln_g(batches, lane));
                 let alpha = swap_acceptance(betas[hotter], h, betas[colder], c);
                 if let Some((part, _)) = places[1] {
                     self.parts[part].tally.counts[colder].swaps.add(alpha);
@@ -515,8 +578,8 @@ impl<W: Default + Send> Block<W> {
                 if open_unit_f64(rng.words(counter, colder as u16)[0]) < alpha {
                     for (place, k) in places.into_iter().zip([hotter, colder]) {
                         let Some((part, at)) = place else { continue };
-                        let Part { walkers, tally, .. } = &mut self.parts[part];
-                        walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
+                        let tally = &mut self.parts[part].tally;
+                        batches[part].walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
                     }
                     self.rung.swap(lanes[0], lanes[1]);
                     self.replica_on.swap(base + hotter - 1, base + colder - 1);
@@ -527,21 +590,21 @@ impl<W: Default + Send> Block<W> {
 
     /// Records what all current states have gathered; must happen before the round ends.
     pub fn flush(&mut self, canvas: &Canvas, round: &Round) {
-        for part in &mut self.parts {
+        for (part, batch) in self.parts.iter_mut().zip(&mut self.batches) {
             for at in 0..part.replicas {
                 let k = usize::from(self.rung[part.first + at]);
                 let tally = &mut part.tally;
-                part.walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
+                batch.walkers.flush(at, &mut |state, w| tally.state(canvas, round, k, state, w));
             }
         }
     }
 
     /// Records into `tally` what the current states have gathered, and leaves them as they are.
     pub fn pending(&self, canvas: &Canvas, round: &Round, tally: &mut Tally) {
-        for part in &self.parts {
-            for (at, &weight) in part.walkers.pending.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+        for (part, Batch { walkers, .. }) in self.parts.iter().zip(&self.batches) {
+            for (at, &weight) in walkers.pending.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
                 let k = usize::from(self.rung[part.first + at]);
-                tally.state(canvas, round, k, part.walkers.whole(at), weight);
+                tally.state(canvas, round, k, walkers.whole(at), weight);
             }
         }
     }
@@ -609,86 +672,212 @@ impl<W: Default + Send> Block<W> {
     /// Rays traced and contributions settled since this was last asked for.
     pub fn take_rays_and_faults(&mut self) -> (u64, Faults) {
         let (mut rays, mut faults) = (0, Faults::default());
-        for part in &mut self.parts {
-            rays += std::mem::take(&mut part.evaluator.out.rays);
-            faults.merge(&std::mem::take(&mut part.evaluator.out.faults));
+        for Batch { evaluator, .. } in &mut self.batches {
+            rays += std::mem::take(&mut evaluator.out.rays);
+            faults.merge(&std::mem::take(&mut evaluator.out.faults));
         }
         (rays, faults)
     }
 }
 
-impl<W: Default> Part<W> {
-    /// One Metropolis step of every replica at its own inverse temperature, and fresh points to offer, in one batch.
-    fn explore<T: Target<Workspace = W>>(
+/// Blocks that go through sweeps together, their lanes in one batch: what comes out is what each would have come to
+/// by itself, but packets of rays are fuller.
+///
+/// Chains sit in the crew's batch as long as there is one, and go back to their blocks when it ends.
+pub struct Crew<'b, W: Default + Send> {
+    blocks: Vec<&'b mut Block<W>>,
+    batches: Vec<Batch<W>>,
+}
+
+impl<'b, W: Default + Send> Crew<'b, W> {
+    /// At least one block; several if all [can join](Block::can_join).
+    pub fn new(blocks: Vec<&'b mut Block<W>>) -> Crew<'b, W> {
+        let mut crew = Crew { blocks, batches: Vec::new() };
+        crew.batches = match &mut crew.blocks[..] {
+            [block] => std::mem::take(&mut block.batches),
+            blocks => vec![join(blocks)],
+        };
+        crew
+    }
+
+    /// Goes through `sweeps` sweeps.
+    pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, canvas: &Canvas, round: &Round) {
+        let bank = steps::bank();
+        let Crew { blocks, batches } = self;
+        for _ in 0..sweeps {
+            match &mut blocks[..] {
+                [block] => block.explore(batches, target, canvas, round, &bank),
+                blocks => explore_together(blocks, &mut batches[0], target, canvas, round, &bank),
+            }
+            blocks.iter_mut().for_each(|block| block.exchange(batches, canvas, round));
+        }
+    }
+}
+
+impl<W: Default + Send> Drop for Crew<'_, W> {
+    fn drop(&mut self) {
+        let Crew { blocks, batches } = self;
+        if let [block] = &mut blocks[..] {
+            block.batches = std::mem::take(batches);
+            return;
+        }
+        let [Batch { walkers, evaluator, .. }] = &mut batches[..] else { return };
+        for block in blocks.iter_mut() {
+            let part = &mut block.parts[0];
+            let [first, _] = std::mem::replace(&mut part.seat, [0, part.replicas]);
+            block.batches[0].walkers = walkers.some(first..first + part.replicas);
+        }
+        let out = &mut blocks[0].batches[0].evaluator.out;
+        out.rays += evaluator.out.rays;
+        out.faults.merge(&evaluator.out.faults);
+    }
+}
+
+/// Seats the lanes of blocks in one batch: all their replicas first, as chains are found by the numbers of their lanes.
+fn join<W: Default + Send>(blocks: &mut [&mut Block<W>]) -> Batch<W> {
+    debug_assert!(blocks.iter().all(|block| block.can_join()));
+    let mut next = [0, blocks.iter().map(|block| block.parts[0].replicas).sum()];
+    let mut counters = [Vec::new(), Vec::new()];
+    for block in blocks.iter_mut() {
+        let part = &mut block.parts[0];
+        part.seat = next;
+        let of_part = &block.batches[0].evaluator.counters;
+        for (i, own) in [&of_part[..part.replicas], &of_part[part.replicas..]].into_iter().enumerate() {
+            counters[i].extend_from_slice(own);
+            next[i] += own.len();
+        }
+    }
+    let walkers = Walkers::joined(blocks.iter().map(|block| &block.batches[0].walkers));
+    Batch { walkers, ..blocks[0].batch(counters.concat()) }
+}
+
+/// Moves all replicas of several blocks and draws all their offers, in one batch.
+fn explore_together<W: Default + Send, T: Target<Workspace = W>>(
+    blocks: &mut [&mut Block<W>],
+    batch: &mut Batch<W>,
+    target: &T,
+    canvas: &Canvas,
+    round: &Round,
+    bank: &[StepLaw; SCALES],
+) {
+    if target.changes_techniques() {
+        for block in blocks.iter_mut() {
+            block.parts[0].warm(batch, round, &block.rung, block.sweeps);
+        }
+        batch.change_techniques(target);
+        for block in blocks.iter_mut() {
+            block.parts[0].settle_changes(batch, canvas, round, &block.rung);
+        }
+    }
+    for block in blocks.iter_mut() {
+        let mixes = &round.mixes[block.trial()];
+        block.parts[0].propose(batch, (bank, mixes), &block.rung, block.sweeps);
+    }
+    batch.evaluate(target);
+    for block in blocks.iter_mut() {
+        block.parts[0].settle(batch, canvas, round, &block.rung, block.sweeps);
+    }
+}
+
+impl<W: Default> Batch<W> {
+    /// Draws which chains change their technique, and evaluates what that leads to.
+    fn change_techniques<T: Target<Workspace = W>>(&mut self, target: &T) {
+        let Batch { walkers, evaluator, betas } = self;
+        evaluator.propose_changes(target, &walkers.points, betas.len(), |lane| betas[lane]);
+    }
+
+    fn evaluate<T: Target<Workspace = W>>(&mut self, target: &T) {
+        self.evaluator.evaluate(target, &self.walkers.points);
+    }
+}
+
+impl Part {
+    /// Lanes of its replicas and of its offers.
+    fn lanes(&self) -> [Range<usize>; 2] {
+        let [replicas, offers] = self.seat;
+        [replicas..replicas + self.replicas, offers..offers + self.offers]
+    }
+
+    /// Has its lanes draw the words of a sweep.
+    fn begin<W>(&self, batch: &mut Batch<W>, sweep: u64) {
+        for lanes in self.lanes() {
+            batch.evaluator.counters[lanes].iter_mut().for_each(|counter| counter.step = sweep);
+        }
+    }
+
+    /// Tells the inverse temperatures of its replicas.
+    fn warm<W>(&self, batch: &mut Batch<W>, round: &Round, rung: &[u16], sweep: u64) {
+        self.begin(batch, sweep);
+        let [lanes, _] = self.lanes();
+        batch.betas.resize(batch.walkers.states.len(), 0.0);
+        for (beta, k) in batch.betas[lanes].iter_mut().zip(&rung[self.first..]) {
+            *beta = round.ladder.betas()[usize::from(*k)];
+        }
+    }
+
+    /// Settles changes of technique of some replicas, before they step: states and weights of the sweep are those that steps
+    /// lead to, so this costs evaluations and no weight.
+    fn settle_changes<W: Default>(&mut self, batch: &mut Batch<W>, canvas: &Canvas, round: &Round, rung: &[u16]) {
+        let Batch { walkers, evaluator, .. } = batch;
+        let ([lanes, _], tally) = (self.lanes(), &mut self.tally);
+        for i in 0..evaluator.drawn.len() {
+            let lane = evaluator.drawn[i];
+            if !lanes.contains(&lane) {
+                continue;
+            }
+            let k = usize::from(rung[self.first + lane - lanes.start]);
+            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let alpha = evaluator.settle_change(walkers, lane, round.ladder.betas()[k], &mut record);
+            tally.counts[k].changes.count(alpha);
+        }
+    }
+
+    /// Says how each of its lanes moves next.
+    fn propose<W: Default>(
         &mut self,
-        target: &T,
-        canvas: &Canvas,
-        round: &Round,
+        batch: &mut Batch<W>,
         (bank, mixes): (&[StepLaw; SCALES], &[StepMix]),
         rung: &[u16],
         sweep: u64,
     ) {
-        if self.evaluator.counters.is_empty() {
-            return;
-        }
-        let rng = self.evaluator.rng();
-        self.evaluator.counters.iter_mut().for_each(|counter| counter.step = sweep);
-        if target.changes_techniques() {
-            self.change_techniques(target, canvas, round, rung);
-        }
-        self.evaluator.moves[self.replicas..].fill(Move::Fresh);
-        for at in 0..self.replicas {
+        self.begin(batch, sweep);
+        let evaluator = &mut batch.evaluator;
+        let ([replicas, offers], rng) = (self.lanes(), evaluator.rng());
+        evaluator.moves[offers].fill(Move::Fresh);
+        for (at, lane) in replicas.enumerate() {
             let k = usize::from(rung[self.first + at]);
-            let counter = Counter { purpose: Purpose::Step, ..self.evaluator.counters[at] };
+            let counter = Counter { purpose: Purpose::Step, ..evaluator.counters[lane] };
             let [decision, choice, ..] = rng.words(counter, 0);
             self.decision[at] = decision;
             self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
-            self.evaluator.moves[at] = Move::Small(bank[usize::from(self.scale[at])]);
+            evaluator.moves[lane] = Move::Small(bank[usize::from(self.scale[at])]);
         }
-        self.evaluator.evaluate(target, &self.walkers.points);
+    }
 
-        let Part { walkers, evaluator, tally, .. } = self;
+    /// Accepts or refuses what was proposed, and records it.
+    fn settle<W: Default>(&mut self, batch: &mut Batch<W>, canvas: &Canvas, round: &Round, rung: &[u16], sweep: u64) {
+        let Batch { walkers, evaluator, .. } = batch;
+        let [replicas, offers] = self.lanes();
+        let tally = &mut self.tally;
         let half = usize::from(sweep >= round.half);
-        for at in 0..self.replicas {
+        for (at, lane) in replicas.enumerate() {
             let k = usize::from(rung[self.first + at]);
             let beta = round.ladder.betas()[k];
             let u = open_unit_f64(self.decision[at]);
             let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
-            let alpha = walkers.step(at, beta, (&evaluator.points, at), &evaluator.out, u, &mut record);
+            let alpha = walkers.step(lane, beta, (&evaluator.points, lane), &evaluator.out, u, &mut record);
             let counts = &mut tally.counts[k];
             counts.steps[usize::from(self.scale[at])].add(alpha);
-            counts.halves[half].add(walkers.states[at].ln_g);
+            counts.halves[half].add(walkers.states[lane].ln_g);
             self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
             counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
         }
-        for at in self.replicas..evaluator.out.lanes.len() {
+        for lane in offers {
             if round.open {
-                tally.only_seen(evaluator.out.whole(at));
+                tally.only_seen(evaluator.out.whole(lane));
             } else {
-                tally.uniform_point(canvas, round, evaluator.out.whole(at), false);
+                tally.uniform_point(canvas, round, evaluator.out.whole(lane), false);
             }
-        }
-    }
-
-    /// Changes of technique of some replicas, before they step: states and weights of the sweep are those that steps lead
-    /// to, so this costs evaluations and no weight.
-    fn change_techniques<T: Target<Workspace = W>>(
-        &mut self,
-        target: &T,
-        canvas: &Canvas,
-        round: &Round,
-        rung: &[u16],
-    ) {
-        let Part { walkers, evaluator, tally, first, replicas, .. } = self;
-        let rung_of = |at: usize| usize::from(rung[*first + at]);
-        let beta_of = |at: usize| round.ladder.betas()[rung_of(at)];
-        evaluator.propose_changes(target, &walkers.points, *replicas, beta_of);
-        for i in 0..evaluator.drawn.len() {
-            let at = evaluator.drawn[i];
-            let k = rung_of(at);
-            let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
-            let alpha = evaluator.settle_change(walkers, at, beta_of(at), &mut record);
-            tally.counts[k].changes.count(alpha);
         }
     }
 }
@@ -709,8 +898,8 @@ mod tests {
             let mut blocks: Vec<Block<()>> = blocks.collect();
             for offers in [1, 4] {
                 blocks.iter_mut().for_each(|block| block.set_offers(offers));
-                let parts = blocks.iter().flat_map(|block| &block.parts);
-                let counters: Vec<Counter> = parts.flat_map(|part| part.evaluator.counters.clone()).collect();
+                let batches = blocks.iter().flat_map(|block| &block.batches);
+                let counters: Vec<Counter> = batches.flat_map(|batch| batch.evaluator.counters.clone()).collect();
                 let words: HashSet<[u32; 4]> = counters.iter().map(|counter| rng.words(*counter, 0)).collect();
                 assert_eq!(counters.len(), 3 * 3 * (rungs - 1 + offers));
                 assert_eq!(words.len(), counters.len(), "{rungs} rungs, {offers} offers");

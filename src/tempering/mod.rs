@@ -31,7 +31,7 @@ mod tuning;
 mod weights;
 
 pub use agreement::{effective_samples, split_r_hat};
-pub use block::{Block, BlockStatistics, SavedBlock};
+pub use block::{Block, BlockStatistics, Crew, SavedBlock};
 pub use choices::{Choices, Combine, LadderChoice};
 pub use density::DensityOfStates;
 pub use estimate::{Estimate, uniform_mean};

@@ -4,8 +4,10 @@ use rayon::ThreadPoolBuilder;
 use relt::{
     chain::Target,
     film::Image,
+    path::Contributions,
     rng::Rng,
-    tempering::{Block, Choices, Combine, Histogram, Ladder, RungCounts},
+    sample::{self, Points, Proposals},
+    tempering::{Block, Choices, Combine, Crew, Histogram, Ladder, RungCounts},
 };
 
 use crate::{
@@ -148,5 +150,90 @@ fn parts_do_not_matter<T: Target>(target: &T, largest: f64) {
             assert_eq!(parts.2, whole.2, "counts, {lanes_a_part} lanes a part, {threads} threads");
             assert_eq!(parts.3, whole.3, "trips, {lanes_a_part} lanes a part, {threads} threads");
         }
+    }
+}
+
+/// A target whose chains also mirror their points in the first dimension, as another way to say the same.
+struct Mirrored<T>(T);
+
+impl<T: Target> Target for Mirrored<T> {
+    type Workspace = T::Workspace;
+
+    fn evaluate(&self, proposals: &mut Proposals, out: &mut Contributions, workspace: &mut T::Workspace) {
+        self.0.evaluate(proposals, out, workspace);
+    }
+
+    fn changes_techniques(&self) -> bool {
+        true
+    }
+
+    fn change_technique(
+        &self,
+        (current, lane): (&Points, usize),
+        _: f64,
+        random: &mut dyn FnMut() -> sample::Block,
+        to: &mut Points,
+        _: &mut u64,
+    ) -> Option<f64> {
+        let [x, y, z, w] = current.block(0, lane);
+        to.reserve(0);
+        to.set(0, lane, [!x, y, z, w]);
+        (random()[0] & 1 == 0).then_some(0.0)
+    }
+}
+
+#[test]
+fn blocks_in_one_crew_come_to_what_each_comes_to_by_itself() {
+    crews_do_not_matter(&two_peaks(), 4.1);
+    crews_do_not_matter(&Mirrored(two_peaks()), 4.1);
+    crews_do_not_matter(&Scattered, Scattered::LARGEST);
+}
+
+fn crews_do_not_matter<T: Target>(target: &T, largest: f64) {
+    const BLOCKS: usize = 3;
+    const LADDERS: usize = 2;
+    let run = |sizes: &[usize]| {
+        let (rng, betas) = (Rng::new(3), vec![0.0, 0.1, 0.3, 0.6, 1.0]);
+        let stage = Stage::new(Ladder::new(betas), &[0.0, -0.5, -1.2, -2.0, -3.0], 16, target.splats_elsewhere());
+        let (canvas, round) = (stage.canvas(), &stage.round);
+        let block = |number: usize| {
+            let mut block = Block::new(rng, (number, LADDERS), 5, 2, 512, stage.layers.count, [16, 1]);
+            let starts = (1..5).map(|k| {
+                let rung = (4 * number + k) as u32;
+                exact_draws(target, round.ladder.betas()[k], largest, LADDERS, rng, rung)
+            });
+            let starts: Vec<_> = starts.collect();
+            block.start(target, &starts.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            block
+        };
+        let mut blocks: Vec<Block<T::Workspace>> = (0..BLOCKS).map(block).collect();
+        let (mut rays, mut changes) = (0, 0);
+        for sweeps in [1, 20] {
+            let mut left = &mut blocks[..];
+            for size in sizes {
+                let together = left.split_off_mut(..*size).expect("as many blocks as are in crews");
+                let mut crew = Crew::new(together.iter_mut().collect());
+                crew.advance(target, sweeps, &canvas, round);
+                crew.advance(target, sweeps, &canvas, round);
+            }
+            rays += blocks.iter_mut().map(|block| block.take_rays_and_faults().0).sum::<u64>();
+        }
+        let seen = |block: &mut Block<T::Workspace>| {
+            block.flush(&canvas, round);
+            block.deposit(&canvas);
+            let (mut histograms, mut counts) = (vec![Histogram::default(); 5], vec![RungCounts::default(); 5]);
+            block.add_histograms(&mut histograms);
+            block.add_counts(&mut counts);
+            changes += counts.iter().map(|counts| counts.changes.proposed).sum::<u64>();
+            (histograms, counts, [block.trips().round_trips, block.trips().restarts])
+        };
+        let seen: Vec<_> = blocks.iter_mut().map(seen).collect();
+        let film: Vec<_> = (0..stage.layers.count).flat_map(|layer| stage.film.layer(layer)).collect();
+        assert_eq!(changes > 0, target.changes_techniques());
+        (film, seen, rays)
+    };
+    let alone = run(&[1, 1, 1]);
+    for sizes in [&[3][..], &[2, 1], &[1, 2]] {
+        assert!(run(sizes) == alone, "crews of {sizes:?}");
     }
 }

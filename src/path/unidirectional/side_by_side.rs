@@ -156,7 +156,7 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
         let (scene, lit) = (mapping.scene(), mapping.scene().features.lights() > 0);
         let roulette = mapping.layout().roulette(bounce);
         // the group and the lists are lent out while the other arrays are written to
-        let mut group = std::mem::take(&mut w.group);
+        let mut group = w.group.take().unwrap_or_default();
         let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes));
         w.begin_bounce();
         let mut kept = 0;
@@ -185,7 +185,7 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
             }
         }
         w.end_bounce(kept);
-        (w.group, w.hit_slots, w.hit_lanes) = (group, slots, lanes);
+        (w.group, w.hit_slots, w.hit_lanes) = (Some(group), slots, lanes);
     }
 }
 

@@ -26,8 +26,8 @@ use serde::{Deserialize, Serialize};
 use sharing::Share;
 
 use super::{
-    Block, Canvas, Choices, Combine, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes, Round,
-    RoundReport, Sum, Tally, Weights,
+    Block, Canvas, Choices, Combine, Crew, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes,
+    Round, RoundReport, Sum, Tally, Weights,
     independent::{Independent, Use},
     probes::TRIALS,
     steps::{self, StepCount},
@@ -51,6 +51,23 @@ const OPEN_BOOTSTRAP: u64 = 1 << 14;
 const RUNGS_OF_ALL_BLOCKS: usize = 4096;
 /// Replicas where their number is free, at most.
 const MOST_AUTOMATIC: usize = 8;
+
+/// Lanes of ladders that are evaluated together where blocks have fewer.
+const LANES_TOGETHER: usize = 128;
+/// Turns of work that a thread has left at least where blocks go together, so that none waits long for another.
+const TURNS_A_THREAD: usize = 4;
+
+/// Portions that one thread works on at once: packets of rays are full only if blocks of few lanes go together. Nothing that
+/// is computed depends on it.
+fn portions_together<W: Default + Send>(portions: &[Portion<W>]) -> usize {
+    let blocks = || portions.iter().filter_map(|portion| portion.ladders.as_ref());
+    if !blocks().all(Block::can_join) {
+        return 1;
+    }
+    let lanes = blocks().map(Block::lanes).max().unwrap_or(LANES_TOGETHER);
+    let at_most = portions.len() / (TURNS_A_THREAD * rayon::current_num_threads());
+    LANES_TOGETHER.div_ceil(lanes).min(at_most).max(1)
+}
 
 /// Replica exchange at work on one target.
 pub struct Sampler<W> {
@@ -368,30 +385,41 @@ impl<W: Default + Send> Sampler<W> {
             (true, first) => first.then_some(&alone),
             (false, _) => Some(&group),
         };
-        let work = |portion: &mut Portion<W>| {
+        let work = |portions: &mut [Portion<W>]| {
             let canvas = screen.canvas();
-            let Portion { uniform, tally, ladders, starts, .. } = portion;
-            for _ in 0..sweeps {
-                if let Some(block) = ladders {
-                    block.advance(target, schedule.ladder_sweeps, &canvas, round);
-                }
-                let keep = |start: Start| {
-                    if keeps && start.ln_g > f64::NEG_INFINITY {
-                        starts.push(start);
-                    }
-                };
-                uniform.sweep(target, (schedule.points, purpose, of_points), &canvas, round, tally, keep);
+            let (mut ladders, mut others) = (Vec::new(), Vec::new());
+            for Portion { uniform, tally, ladders: block, starts, .. } in portions.iter_mut() {
+                ladders.extend(block);
+                others.push((uniform, tally, starts));
             }
-            uniform.settle(&canvas, tally);
-            tally.deposit(&canvas, half, None);
-            if let Some(block) = ladders {
-                block.deposit(&canvas);
+            let mut crew = (!ladders.is_empty()).then(|| Crew::new(ladders));
+            for _ in 0..sweeps {
+                if let Some(crew) = &mut crew {
+                    crew.advance(target, schedule.ladder_sweeps, &canvas, round);
+                }
+                for (uniform, tally, starts) in &mut others {
+                    let keep = |start: Start| {
+                        if keeps && start.ln_g > f64::NEG_INFINITY {
+                            starts.push(start);
+                        }
+                    };
+                    uniform.sweep(target, (schedule.points, purpose, of_points), &canvas, round, tally, keep);
+                }
+            }
+            drop(crew);
+            for Portion { uniform, tally, ladders, .. } in portions {
+                uniform.settle(&canvas, tally);
+                tally.deposit(&canvas, half, None);
+                if let Some(block) = ladders {
+                    block.deposit(&canvas);
+                }
             }
         };
+        let together = portions_together(&self.portions[own.clone()]);
         match &mut self.portions[own.clone()] {
             // on this very thread, which then may wait for others that share it
-            [portion] => work(portion),
-            portions => portions.par_iter_mut().for_each(work),
+            [portion] => work(std::slice::from_mut(portion)),
+            portions => portions.par_chunks_mut(together).for_each(work),
         }
         let drawn = sweeps * (self.portions.len() * self.state.schedule.points) as u64;
         let drawn_here = if group.is_first() { sweeps * (own.len() * self.state.schedule.points) as u64 } else { 0 };
