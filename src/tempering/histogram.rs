@@ -38,6 +38,8 @@ struct Bin {
     moment: i128,
 }
 
+/// A page without states.
+const EMPTY: Page = [Bin { weight: 0, moment: 0 }; BINS_PER_NAT as usize];
 /// Bins of a nat.
 pub(super) const BINS_PER_NAT: i64 = 64;
 /// Steps of a weight of 1.
@@ -110,7 +112,7 @@ impl Histogram {
         if index >= self.pages.len() {
             self.pages.resize(index + 1, None);
         }
-        self.pages[index].get_or_insert_with(|| Box::new([Bin::default(); BINS_PER_NAT as usize]));
+        self.pages[index].get_or_insert_with(|| Box::new(EMPTY));
     }
 
     /// Adds all of another histogram's weights.
@@ -118,12 +120,19 @@ impl Histogram {
         self.lit += other.lit;
         self.dark += other.dark;
         for (i, theirs) in other.pages.iter().enumerate() {
-            let Some(theirs) = theirs else { continue };
+            let Some(theirs) = theirs.as_ref().filter(|page| ***page != EMPTY) else { continue };
             for (bin, more) in self.page(other.first + i as i64).iter_mut().zip(theirs.iter()) {
                 bin.weight += more.weight;
                 bin.moment += more.moment;
             }
         }
+    }
+
+    /// Adds all of another histogram's weights, which forgets them and keeps its pages for what is to come.
+    pub fn take(&mut self, other: &mut Histogram) {
+        self.merge(other);
+        (other.lit, other.dark) = (0, 0);
+        other.pages.iter_mut().flatten().for_each(|page| **page = EMPTY);
     }
 
     /// Numbers and sums of the occupied bins, from darkest to brightest.

@@ -161,7 +161,7 @@ impl PointGroups {
     /// Adds to a group what a tally has seen of the uniform rung, which forgets it.
     pub fn take(&self, group: usize, tally: &mut Tally) {
         let mut seen = self.locked(group);
-        seen.histogram.merge(&std::mem::take(&mut tally.histograms[0]));
+        seen.histogram.take(&mut tally.histograms[0]);
         seen.hot.merge(std::mem::take(&mut tally.hot));
         seen.even.merge(std::mem::take(&mut tally.even));
     }
