@@ -57,6 +57,8 @@ static ALLOCATOR: Counting = Counting;
 /// Mutations of a run, and those that are gone through before anything is counted.
 const PLANNED: u64 = 1 << 20;
 const WARM: u64 = 1 << 18;
+/// Of the image: so few pixels that many quarters of a pass, at whose ends histograms are handed over, lie in 16 sweeps.
+const RESOLUTION: &str = "32";
 /// Slices of each length, of which the one counts that asked least often: in others a round may have ended, or a state come
 /// of a brightness that none had.
 const SLICES: usize = 4;
@@ -96,7 +98,7 @@ fn asked(scene: &Scene, kind: MappingKind, method: Method) -> [u64; 2] {
 fn sweeps_take_no_memory() {
     let device = Device::new("").unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/caustic/scene.xml");
-    let scene = Scene::new(&device, relt::load::scene(&path, &[]).unwrap()).unwrap();
+    let scene = Scene::new(&device, relt::load::scene(&path, &[("res".into(), RESOLUTION.into())]).unwrap()).unwrap();
     render::thread_pool(1, false).unwrap().install(|| {
         for kind in [MappingKind::Unidirectional, MappingKind::Bidirectional, MappingKind::Multiplexed] {
             for method in [Method::Path, Method::Mlt, Method::ReplicaExchange] {

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, replay};
+use super::{Evaluator, Recorder, Start, Target, TechniqueChanges, Walkers, Whereabouts, replay};
 use crate::{
     path::{Faults, Whole},
     rng::{Counter, Purpose, Rng, open_unit_f64},
@@ -58,6 +58,8 @@ pub struct Baseline<W> {
     /// ln g of states in the earlier and the later half of the steps: the later one ends with the last step and begins with
     /// the largest power of two that is no later than that.
     pub halves: [Moments; 2],
+    /// Where states lay on the film in the same halves.
+    pub whereabouts: [Whereabouts; 2],
     /// Changes of technique.
     pub changed: TechniqueChanges,
     /// Σ of acceptance probabilities of small steps and how many there were.
@@ -81,6 +83,7 @@ pub struct SavedBaseline {
     refused: Vec<u32>,
     longest_rejection: u32,
     halves: [Moments; 2],
+    whereabouts: [Whereabouts; 2],
     rays: u64,
     faults: Faults,
 }
@@ -98,6 +101,7 @@ impl<W: Default> Baseline<W> {
             refused: self.refused.clone(),
             longest_rejection: self.longest_rejection,
             halves: self.halves,
+            whereabouts: self.whereabouts,
             rays: self.evaluator.out.rays,
             faults: self.evaluator.out.faults.clone(),
         }
@@ -112,7 +116,7 @@ impl<W: Default> Baseline<W> {
         large_steps: LargeSteps,
     ) -> Result<Baseline<W>, Unfit> {
         let SavedBaseline { walkers, steps, changed, small, large, large_sum, .. } = saved;
-        let SavedBaseline { refused, longest_rejection, halves, rays, faults, .. } = saved;
+        let SavedBaseline { refused, longest_rejection, halves, whereabouts, rays, faults, .. } = saved;
         expect(walkers.fits(chains) && refused.len() == chains, "chains")?;
         let mut evaluator = Baseline::evaluator(rng, first_chain, chains);
         (evaluator.out.rays, evaluator.out.faults) = (rays, faults);
@@ -126,6 +130,7 @@ impl<W: Default> Baseline<W> {
             refused,
             longest_rejection,
             halves,
+            whereabouts,
             changed,
             small,
             large,
@@ -158,6 +163,7 @@ impl<W: Default> Baseline<W> {
             refused: vec![0; starts.len()],
             longest_rejection: 0,
             halves: [Moments::default(); 2],
+            whereabouts: [Whereabouts::default(); 2],
             changed: TechniqueChanges::default(),
             steps: 0,
             small: (0.0, 0),
@@ -194,6 +200,8 @@ impl<W: Default> Baseline<W> {
         self.evaluator.evaluate(target, &self.walkers.points);
         if self.steps.is_power_of_two() {
             self.halves = [self.halves[0].merged(self.halves[1]), Moments::default()];
+            let [earlier, later] = &mut self.whereabouts;
+            earlier.merge(&std::mem::take(later));
         }
         for lane in 0..self.evaluator.moves.len() {
             let proposed = self.evaluator.out.whole(lane);
@@ -206,8 +214,9 @@ impl<W: Default> Baseline<W> {
             }
             let u = self.decisions[lane];
             let large_steps = self.large_steps;
-            let Evaluator { points, out, .. } = &self.evaluator;
+            let (Evaluator { points, out, .. }, [_, whereabouts]) = (&self.evaluator, &mut self.whereabouts);
             let alpha = self.walkers.step(lane, 1.0, (points, lane), out, u, &mut |state, weight| {
+                whereabouts.add(state, weight);
                 large_steps.record(baseline_layer::CHAINS, state, weight, unit, recorder);
             });
             let count = if small { &mut self.small } else { &mut self.large };
@@ -281,7 +290,7 @@ impl Moments {
         Moments { states: self.states + other.states, sum: self.sum + other.sum, squares: self.squares + other.squares }
     }
 
-    /// Mean square of the distance from the mean; NaN without states.
+    /// Mean square of the distance from the mean; 0 without states.
     pub fn variance(self) -> f64 {
         let mean = self.sum / self.states;
         (self.squares / self.states - mean * mean).max(0.0)

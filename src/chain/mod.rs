@@ -9,6 +9,7 @@ mod recorder;
 mod start;
 mod target;
 mod walkers;
+mod whereabouts;
 
 pub use baseline::{Baseline, LARGE_STEP_PROBABILITY, LargeSteps, Moments, SavedBaseline, baseline_layer};
 pub use changes::{TECHNIQUE_CHANGES, TechniqueChanges};
@@ -19,3 +20,4 @@ pub use recorder::Recorder;
 pub use start::{Start, replay, resample};
 pub use target::{Evaluator, Target};
 pub use walkers::Walkers;
+pub use whereabouts::Whereabouts;

@@ -15,14 +15,14 @@ use super::{
     settings::{MltSettings, Normalisation},
 };
 use crate::{
-    chain::{Baseline, Evaluator, LargeSteps, Plan, SavedBaseline, Start, baseline_layer, resample},
+    chain::{Baseline, Evaluator, LargeSteps, Plan, SavedBaseline, Start, Whereabouts, baseline_layer, resample},
     film::{Accumulator, Footprint, Plane, Splats},
     path::{Faults, Workspace},
     ranks::Company,
     rng::{Counter, Purpose, Rng},
     sample::{Move, Points},
     saved::{Source, Unfit, expect, write_value},
-    tempering::{Estimate, split_r_hat},
+    tempering::{Estimate, Mixing},
 };
 
 /// Independent samples of the first pass; half of the budget where that is less.
@@ -155,14 +155,14 @@ impl Mlt {
         let chains = || self.blocks.iter().map(|block| &block.chains);
         let small = chains().fold((0.0, 0), |sum, chains| (sum.0 + chains.small.0, sum.1 + chains.small.1));
         let halves = chains().flat_map(|chains| chains.halves).filter(|half| half.states > 0.0);
-        let means: Vec<f64> = halves.clone().map(|half| half.sum / half.states).collect();
+        let means: Vec<[f64; 1]> = halves.clone().map(|half| [half.sum / half.states]).collect();
+        let whereabouts: Vec<Whereabouts> = chains().flat_map(|chains| chains.whereabouts).collect();
         let all = halves.reduce(|a, b| a.merged(b)).unwrap_or_default();
         Some(ChainReport {
             steps: first.steps(),
             acceptance: small.0 / small.1 as f64,
             longest_rejection_run: chains().map(|chains| u64::from(chains.longest_rejection)).max().unwrap_or(0),
-            split_r_hat: split_r_hat(&means, all.variance().sqrt()),
-            halves: means.len(),
+            mixing: Mixing::of(&means, all.variance(), &whereabouts),
         })
     }
 

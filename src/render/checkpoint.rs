@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Version of the format; another one whenever what a file holds changes its meaning.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Bytes of the first line, at most; what it holds of a long ladder takes some ten thousand.
 const LONGEST_HEADER: u64 = 1 << 24;
 /// Bytes of the checksum at the end.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::settings::{LadderChoice, Method, Normalisation, Settings};
 use super::status::Status;
-use crate::tempering::{RoundReport, effective_samples, rungs};
+use crate::tempering::{Mixing, RoundReport, effective_samples, rungs};
 
 /// How far a run can be trusted, best first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -80,10 +80,8 @@ pub struct ChainReport {
     pub acceptance: f64,
     /// Most steps in a row that one chain refused.
     pub longest_rejection_run: u64,
-    /// Split R̂ of ln g over blocks of chains, as of rounds; NaN where too little is known.
-    pub split_r_hat: f64,
-    /// Halves of blocks that it compares.
-    pub halves: usize,
+    /// How far blocks of chains agree, as of rounds.
+    pub mixing: Mixing,
 }
 
 /// What a run is judged by.
@@ -218,7 +216,9 @@ fn ladder(evidence: &Evidence, find: Find) {
         "render longer".into()
     };
     stuck(round.longest_rejection_run, steps, &advice, find);
-    effective(round.split_r_hat, round.r_hat_halves, "ladders", "render longer, or with fewer --replicas", find);
+    let mixing =
+        Mixing { r_hat_ln_g: round.split_r_hat, r_hat_film: round.split_r_hat_image, halves: round.r_hat_halves };
+    effective(&mixing, "ladders", "render longer, or with fewer --replicas", find);
 }
 
 /// Neighbours that refuse to swap.
@@ -274,12 +274,16 @@ fn stuck(longest: u64, steps: u64, advice: &str, find: Find) {
     find(stuck.then_some(Verdict::Doubtful), what, advice);
 }
 
-/// Few independent states.
-fn effective(split_r_hat: f64, halves: usize, of: &str, advice: &str, find: Find) {
-    let effective = effective_samples(split_r_hat, halves);
+/// Few independent states, by what tells of fewer: how bright they are, or where they are.
+fn effective(mixing: &Mixing, of: &str, advice: &str, find: Find) {
+    let told = [(mixing.r_hat_ln_g, "ln g"), (mixing.r_hat_film, "image blocks")];
+    // the larger R̂ is that of fewer states; one that is not known says nothing
+    let known = told.into_iter().filter(|(r_hat, _)| !r_hat.is_nan());
+    let Some((r_hat, what)) = known.max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+    let effective = effective_samples(r_hat, mixing.halves);
     let verdict = Verdict::from(effective, EFFECTIVE[0], EFFECTIVE[1]);
     let what = format!(
-        "all chains on the target are worth {effective:.0} independent states (split R̂ of {of} {split_r_hat:.3})"
+        "all chains on the target are worth {effective:.0} independent states (split R̂ of {what} over {of} {r_hat:.3})"
     );
     find(verdict, what, advice);
 }
@@ -291,7 +295,7 @@ fn chains(evidence: &Evidence, find: Find) {
     let what = format!("chains accept {:.1} % of their small steps", 100.0 * chains.acceptance);
     find(accepted, what, "use --method re, which makes steps as small as the scene needs");
     stuck(chains.longest_rejection_run, chains.steps, "use --method re, whose ladder frees it, or render longer", find);
-    effective(chains.split_r_hat, chains.halves, "blocks", "render longer, or use --method re", find);
+    effective(&chains.mixing, "blocks", "render longer, or use --method re", find);
 }
 
 #[cfg(test)]
@@ -319,6 +323,7 @@ mod tests {
             round_trips_predicted: 1000.0,
             longest_rejection_run: 300,
             split_r_hat: 1.01,
+            split_r_hat_image: 1.01,
             r_hat_halves: 128,
             rungs: (0..4).map(rung).collect(),
             ..RoundReport::default()
@@ -326,7 +331,8 @@ mod tests {
     }
 
     fn chain_report() -> ChainReport {
-        ChainReport { steps: 4096, acceptance: 0.4, longest_rejection_run: 200, split_r_hat: 1.01, halves: 128 }
+        let mixing = Mixing { r_hat_ln_g: 1.01, r_hat_film: 1.01, halves: 128 };
+        ChainReport { steps: 4096, acceptance: 0.4, longest_rejection_run: 200, mixing }
     }
 
     fn status() -> Status {
@@ -405,7 +411,8 @@ mod tests {
         // 128 halves: R̂² − 1 = 128/N
         assert_told(&of_round(|r| r.split_r_hat = 1.6), Verdict::Doubtful, "worth 82 independent", "render longer");
         assert_told(&of_round(|r| r.split_r_hat = 2.5), Verdict::Bad, "worth 24 independent", "fewer --replicas");
-        assert_eq!(of_round(|r| r.split_r_hat = f64::NAN), Health::default());
+        assert_told(&of_round(|r| r.split_r_hat_image = 2.5), Verdict::Bad, "R̂ of image blocks", "fewer --replicas");
+        assert_eq!(of_round(|r| (r.split_r_hat, r.split_r_hat_image) = (f64::NAN, f64::NAN)), Health::default());
     }
 
     #[test]
@@ -436,7 +443,7 @@ mod tests {
         assert_told(&of(|c| c.acceptance = 0.03), Verdict::Doubtful, "accept 3.0 %", "--method re");
         assert_told(&of(|c| c.acceptance = 0.01), Verdict::Bad, "accept 1.0 %", "--method re");
         assert_told(&of(|c| c.longest_rejection_run = 4000), Verdict::Doubtful, "refused 4000", "--method re");
-        assert_told(&of(|c| c.split_r_hat = 2.5), Verdict::Bad, "worth 24", "--method re");
+        assert_told(&of(|c| c.mixing.r_hat_film = 2.5), Verdict::Bad, "worth 24", "--method re");
         assert_eq!(of(|c| (c.steps, c.longest_rejection_run) = (300, 200)), Health::default(), "too short to be stuck");
     }
 

@@ -193,6 +193,7 @@ fn ladder(report: &RoundReport) -> Vec<(String, Value)> {
         ("restarts", (report.restarts as f64).into()),
         ("longest_rejection_run", (report.longest_rejection_run as f64).into()),
         ("split_r_hat", report.split_r_hat.into()),
+        ("split_r_hat_image", report.split_r_hat_image.into()),
         ("uniform_share", report.uniform_share.into()),
         ("offers", (report.offers as f64).into()),
         ("chain_ratio", report.chain_ratio.into()),

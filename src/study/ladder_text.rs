@@ -56,9 +56,10 @@ pub fn facts(log: &RunLog, round: &RoundReport) -> Vec<String> {
             round.restarts
         ),
         format!(
-            "longest run of rejected mutations {}, split R̂ {}",
+            "longest run of rejected mutations {}, split R̂ {} of ln g and {} of image blocks",
             round.longest_rejection_run,
-            significant(round.split_r_hat, 4)
+            significant(round.split_r_hat, 4),
+            significant(round.split_r_hat_image, 4)
         ),
     ];
     let before = round.image_share_before;

@@ -4,7 +4,7 @@ mod crew;
 
 use std::{ops::Range, sync::Arc};
 
-pub use crew::Crew;
+pub use crew::{Crew, MOST_BLOCKS};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use super::{
     Canvas, Histogram, Round, RungCounts, SavedTally, Sum, Tally,
     ladder::swap_acceptance,
     probes::TRIALS,
-    steps::{SCALES, StepMix},
+    steps::SCALES,
     trips::{IndexProcess, Trips},
 };
 use crate::{
@@ -78,6 +78,24 @@ struct Batch<W> {
     evaluator: Evaluator<W>,
     /// Inverse temperatures of the replicas, where techniques are changed.
     betas: Vec<f64>,
+}
+
+/// What all parts of all blocks work on in a sweep.
+struct Work<'a, T> {
+    target: &'a T,
+    canvas: &'a Canvas<'a>,
+    round: &'a Round,
+    /// Small steps by scale.
+    bank: &'a [StepLaw; SCALES],
+}
+
+/// A part in a batch, and what it takes from its block: the rungs of all replicas, the way to move that is tried, and the
+/// sweep at work.
+struct Seated<'a> {
+    part: &'a mut Part,
+    rung: &'a [u16],
+    trial: usize,
+    sweep: u64,
 }
 
 /// Replicas that follow one another, and offers, all of a batch.
@@ -439,28 +457,17 @@ impl<W: Default + Send> Block<W> {
         Crew::new(vec![self]).advance(target, sweeps, canvas, round);
     }
 
+    /// Its only part, for a batch that it shares with other blocks.
+    fn seated(&mut self) -> Seated<'_> {
+        let (trial, sweep) = (self.trial(), self.sweeps);
+        Seated { part: &mut self.parts[0], rung: &self.rung, trial, sweep }
+    }
+
     /// Moves all replicas and draws all offers, part by part.
-    fn explore<T: Target<Workspace = W>>(
-        &mut self,
-        batches: &mut [Batch<W>],
-        target: &T,
-        canvas: &Canvas,
-        round: &Round,
-        bank: &[StepLaw; SCALES],
-    ) {
-        let (rung, sweep, mixes) = (&self.rung, self.sweeps, &round.mixes[self.trial()]);
+    fn explore<T: Target<Workspace = W>>(&mut self, batches: &mut [Batch<W>], work: &Work<T>) {
+        let (trial, sweep, rung) = (self.trial(), self.sweeps, &self.rung);
         let explore = |(part, batch): (&mut Part, &mut Batch<W>)| {
-            if batch.evaluator.counters.is_empty() {
-                return;
-            }
-            if target.changes_techniques() {
-                part.warm(batch, round, rung, sweep);
-                batch.change_techniques(target);
-                part.settle_changes(batch, canvas, round, rung);
-            }
-            part.propose(batch, (bank, mixes), rung, sweep);
-            batch.evaluate(target);
-            part.settle(batch, canvas, round, rung, sweep);
+            batch.explore(&mut [Seated { part, rung, trial, sweep }], work);
         };
         match (&mut self.parts[..], batches) {
             ([part], [batch]) => explore((part, batch)),
@@ -595,6 +602,7 @@ impl<W: Default + Send> Block<W> {
     /// Records what all current states have gathered; must happen before the round ends.
     pub fn flush(&mut self, canvas: &Canvas, round: &Round) {
         for (part, batch) in self.parts.iter_mut().zip(&mut self.batches) {
+            part.tally.half = usize::from(self.sweeps > round.half);
             for at in 0..part.replicas {
                 let k = usize::from(self.rung[part.first + at]);
                 let tally = &mut part.tally;
@@ -685,14 +693,20 @@ impl<W: Default + Send> Block<W> {
 }
 
 impl<W: Default> Batch<W> {
-    /// Draws which chains change their technique, and evaluates what that leads to.
-    fn change_techniques<T: Target<Workspace = W>>(&mut self, target: &T) {
-        let Batch { walkers, evaluator, betas } = self;
-        evaluator.propose_changes(target, &walkers.points, betas.len(), |lane| betas[lane]);
-    }
-
-    fn evaluate<T: Target<Workspace = W>>(&mut self, target: &T) {
-        self.evaluator.evaluate(target, &self.walkers.points);
+    /// Moves the replicas and draws the offers of all parts that sit in the batch.
+    fn explore<T: Target<Workspace = W>>(&mut self, seated: &mut [Seated], work: &Work<T>) {
+        if self.evaluator.counters.is_empty() {
+            return;
+        }
+        if work.target.changes_techniques() {
+            seated.iter_mut().for_each(|seated| seated.warm(self, work));
+            let Batch { walkers, evaluator, betas } = self;
+            evaluator.propose_changes(work.target, &walkers.points, betas.len(), |lane| betas[lane]);
+            seated.iter_mut().for_each(|seated| seated.settle_changes(self, work));
+        }
+        seated.iter_mut().for_each(|seated| seated.propose(self, work));
+        self.evaluator.evaluate(work.target, &self.walkers.points);
+        seated.iter_mut().for_each(|seated| seated.settle(self, work));
     }
 }
 
@@ -702,35 +716,44 @@ impl Part {
         let [replicas, offers] = self.seat;
         [replicas..replicas + self.replicas, offers..offers + self.offers]
     }
+}
 
-    /// Has its lanes draw the words of a sweep.
-    fn begin<W>(&self, batch: &mut Batch<W>, sweep: u64) {
-        for lanes in self.lanes() {
-            batch.evaluator.counters[lanes].iter_mut().for_each(|counter| counter.step = sweep);
+impl Seated<'_> {
+    /// Has its lanes draw the words of the sweep.
+    fn begin<W>(&self, batch: &mut Batch<W>) {
+        for lanes in self.part.lanes() {
+            batch.evaluator.counters[lanes].iter_mut().for_each(|counter| counter.step = self.sweep);
         }
     }
 
+    /// Rung of its replica in that place.
+    fn rung(&self, at: usize) -> usize {
+        usize::from(self.rung[self.part.first + at])
+    }
+
     /// Tells the inverse temperatures of its replicas.
-    fn warm<W>(&self, batch: &mut Batch<W>, round: &Round, rung: &[u16], sweep: u64) {
-        self.begin(batch, sweep);
-        let [lanes, _] = self.lanes();
+    fn warm<W, T>(&self, batch: &mut Batch<W>, work: &Work<T>) {
+        self.begin(batch);
+        let [lanes, _] = self.part.lanes();
         batch.betas.resize(batch.walkers.states.len(), 0.0);
-        for (beta, k) in batch.betas[lanes].iter_mut().zip(&rung[self.first..]) {
-            *beta = round.ladder.betas()[usize::from(*k)];
+        for (at, beta) in batch.betas[lanes].iter_mut().enumerate() {
+            *beta = work.round.ladder.betas()[self.rung(at)];
         }
     }
 
     /// Settles changes of technique of some replicas, before they step: states and weights of the sweep are those that steps
     /// lead to, so this costs evaluations and no weight.
-    fn settle_changes<W: Default>(&mut self, batch: &mut Batch<W>, canvas: &Canvas, round: &Round, rung: &[u16]) {
+    fn settle_changes<W: Default, T>(&mut self, batch: &mut Batch<W>, work: &Work<T>) {
+        let &Work { canvas, round, .. } = work;
         let Batch { walkers, evaluator, .. } = batch;
-        let ([lanes, _], tally) = (self.lanes(), &mut self.tally);
+        let [lanes, _] = self.part.lanes();
         for i in 0..evaluator.drawn.len() {
             let lane = evaluator.drawn[i];
             if !lanes.contains(&lane) {
                 continue;
             }
-            let k = usize::from(rung[self.first + lane - lanes.start]);
+            let k = self.rung(lane - lanes.start);
+            let tally = &mut self.part.tally;
             let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
             let alpha = evaluator.settle_change(walkers, lane, round.ladder.betas()[k], &mut record);
             tally.counts[k].changes.count(alpha);
@@ -738,50 +761,44 @@ impl Part {
     }
 
     /// Says how each of its lanes moves next.
-    fn propose<W: Default>(
-        &mut self,
-        batch: &mut Batch<W>,
-        (bank, mixes): (&[StepLaw; SCALES], &[StepMix]),
-        rung: &[u16],
-        sweep: u64,
-    ) {
-        self.begin(batch, sweep);
-        let evaluator = &mut batch.evaluator;
-        let ([replicas, offers], rng) = (self.lanes(), evaluator.rng());
+    fn propose<W: Default, T>(&mut self, batch: &mut Batch<W>, work: &Work<T>) {
+        self.begin(batch);
+        let (evaluator, mixes) = (&mut batch.evaluator, &work.round.mixes[self.trial]);
+        let ([replicas, offers], rng) = (self.part.lanes(), evaluator.rng());
         evaluator.moves[offers].fill(Move::Fresh);
         for (at, lane) in replicas.enumerate() {
-            let k = usize::from(rung[self.first + at]);
             let counter = Counter { purpose: Purpose::Step, ..evaluator.counters[lane] };
             let [decision, choice, ..] = rng.words(counter, 0);
-            self.decision[at] = decision;
-            self.scale[at] = mixes[k].pick(open_unit_f64(choice)) as u8;
-            evaluator.moves[lane] = Move::Small(bank[usize::from(self.scale[at])]);
+            let scale = mixes[self.rung(at)].pick(open_unit_f64(choice));
+            (self.part.decision[at], self.part.scale[at]) = (decision, scale as u8);
+            evaluator.moves[lane] = Move::Small(work.bank[scale]);
         }
     }
 
     /// Accepts or refuses what was proposed, and records it.
-    fn settle<W: Default>(&mut self, batch: &mut Batch<W>, canvas: &Canvas, round: &Round, rung: &[u16], sweep: u64) {
+    fn settle<W: Default, T>(&mut self, batch: &mut Batch<W>, work: &Work<T>) {
+        let &Work { canvas, round, .. } = work;
         let Batch { walkers, evaluator, .. } = batch;
-        let [replicas, offers] = self.lanes();
-        let tally = &mut self.tally;
-        let half = usize::from(sweep >= round.half);
+        let [replicas, offers] = self.part.lanes();
+        self.part.tally.half = usize::from(self.sweep >= round.half);
         for (at, lane) in replicas.enumerate() {
-            let k = usize::from(rung[self.first + at]);
-            let beta = round.ladder.betas()[k];
-            let u = open_unit_f64(self.decision[at]);
+            let k = self.rung(at);
+            let Part { tally, decision, scale, refused, .. } = &mut *self.part;
+            let u = open_unit_f64(decision[at]);
             let mut record = |state: Whole, w: f64| tally.state(canvas, round, k, state, w);
+            let beta = round.ladder.betas()[k];
             let alpha = walkers.step(lane, beta, (&evaluator.points, lane), &evaluator.out, u, &mut record);
             let counts = &mut tally.counts[k];
-            counts.steps[usize::from(self.scale[at])].add(alpha);
-            counts.halves[half].add(walkers.states[lane].ln_g);
-            self.refused[at] = if u < alpha { 0 } else { self.refused[at] + 1 };
-            counts.longest_rejection = counts.longest_rejection.max(self.refused[at]);
+            counts.steps[usize::from(scale[at])].add(alpha);
+            counts.halves[tally.half].add(walkers.states[lane].ln_g);
+            refused[at] = if u < alpha { 0 } else { refused[at] + 1 };
+            counts.longest_rejection = counts.longest_rejection.max(refused[at]);
         }
         for lane in offers {
             if round.open {
-                tally.only_seen(evaluator.out.whole(lane));
+                self.part.tally.only_seen(evaluator.out.whole(lane));
             } else {
-                tally.uniform_point(canvas, round, evaluator.out.whole(lane), false);
+                self.part.tally.uniform_point(canvas, round, evaluator.out.whole(lane), false);
             }
         }
     }

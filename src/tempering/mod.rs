@@ -30,7 +30,7 @@ mod trips;
 mod tuning;
 mod weights;
 
-pub use agreement::{effective_samples, split_r_hat};
+pub use agreement::{Mixing, effective_samples};
 pub use block::{Block, BlockStatistics, Crew, SavedBlock};
 pub use choices::{Choices, Combine, LadderChoice};
 pub use density::DensityOfStates;

@@ -76,6 +76,10 @@ pub struct RoundReport {
     /// ladders agree, above 1.01 where they have not forgotten their starts.
     #[serde(deserialize_with = "or_nan")]
     pub split_r_hat: f64,
+    /// The same of the shares that blocks of the image, four by four, have of the states on the target; NaN in logs that do not
+    /// tell.
+    #[serde(default = "unknown", deserialize_with = "or_nan")]
+    pub split_r_hat_image: f64,
     /// Halves of blocks of ladders that it compares; 0 in logs that do not tell.
     #[serde(default)]
     pub r_hat_halves: usize,
@@ -227,6 +231,11 @@ impl LnEstimate {
     pub fn standard_error(&self) -> f64 {
         self.value() * self.relative_error
     }
+}
+
+/// What logs that do not tell a number say of it.
+fn unknown() -> f64 {
+    f64::NAN
 }
 
 /// Reads numbers, and `null` as NaN.

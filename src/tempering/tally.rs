@@ -11,7 +11,7 @@ use super::{
     steps::{SCALES, StepCount},
 };
 use crate::{
-    chain::{Recorder, TechniqueChanges},
+    chain::{Recorder, TechniqueChanges, Whereabouts},
     film::{Accumulator, Footprint, Splats},
     path::{Outcome, Whole},
     saved::{Unfit, expect},
@@ -252,6 +252,8 @@ pub struct RungCounts {
     pub swaps: StepCount,
     /// ln g of states in the two halves of the round.
     pub halves: [LnMean; 2],
+    /// Where states on the target were in the two halves of the round.
+    pub whereabouts: [Whereabouts; 2],
     /// Luminance that went to the balanced image, in the unit of the weights, and its weight.
     pub luminance: Sum,
     /// Most steps in a row that a chain refused.
@@ -265,6 +267,7 @@ impl RungCounts {
         self.changes.merge(&other.changes);
         self.swaps += other.swaps;
         self.halves.iter_mut().zip(other.halves).for_each(|(a, b)| a.merge(b));
+        self.whereabouts.iter_mut().zip(&other.whereabouts).for_each(|(a, b)| a.merge(b));
         self.luminance.merge(other.luminance);
         self.longest_rejection = self.longest_rejection.max(other.longest_rejection);
     }
@@ -325,6 +328,8 @@ pub struct Tally {
     even: Sum,
     /// The same as `hot` of tempered states, since ever.
     pub tempered: Sum,
+    /// The half of the round at work.
+    pub half: usize,
     /// S of the outcomes of one open point.
     mixtures: Vec<f64>,
 }
@@ -351,6 +356,7 @@ impl Tally {
             hot: Sum::default(),
             even: Sum::default(),
             tempered: Sum::default(),
+            half: 0,
             mixtures: Vec::new(),
         }
     }
@@ -477,7 +483,11 @@ impl Tally {
         self.histograms[k].add(ln_g, weight);
         let size = canvas.size.map(|n| n as f32);
         let mut recorder = Recorder { footprint: canvas.footprint, size, splats: &mut self.splats };
-        if let Some(layer) = canvas.layers.target.filter(|_| k + 1 == round.ladder.rungs()) {
+        let on_target = k + 1 == round.ladder.rungs();
+        if on_target {
+            self.counts[k].whereabouts[self.half].add(state, weight);
+        }
+        if let Some(layer) = canvas.layers.target.filter(|_| on_target) {
             recorder.splat(layer, state, round.weights.target(ln_g) * weight, weight);
         }
         let Some(layer) = canvas.layers.tempered else { return };

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Paths per CPU-second of relt beside Mitsuba 3's path tracer, on the same scene, in the same run, on one thread.
 
-    throughput.py [--relt PROGRAM] [--scene FILE] [--rounds N] [--variants llvm_ad_rgb,scalar_rgb]
+    throughput.py [--relt PROGRAM] [--scene FILE] [--rounds N] [--variants llvm_ad_rgb,llvm_ad_rgb+robust,scalar_rgb]
 
 Needs `pip install mitsuba numpy` (3.9.1 of the former). The variant llvm_ad_rgb compiles for this processor with LLVM: versions 14 and 15 do
 not know the newest ones and fail; point DRJIT_LIBLLVM_PATH at the library of version 16 or later. On Debian 12:
@@ -14,12 +14,14 @@ The scene is Bitterli's Cornell box at 512 × 512 pixels and at most 8 edges, ro
 bounce on); RELT_SCENES is the folder that it lies in. Who goes first changes from round to round, and what is told is
 the median over rounds of what each process spent of the processor, all its threads, system time included. Start-up
 counts for nobody: relt's is the difference of two budgets, and Mitsuba has compiled its kernels before. A path of relt's
-is a mutation: a whole path with next-event estimation, accepted or not, splatted on the film.
+is a mutation: a whole path with next-event estimation, accepted or not, splatted on the film. Mitsuba leaves Embree's flag
+ROBUST away, without which rays pass through edges; relt never does. "+robust" has Mitsuba set it too.
 """
 
 import argparse
 import os
 import pathlib
+import re
 import resource
 import statistics
 import subprocess
@@ -59,9 +61,14 @@ def mitsuba_alone(variant, scene):
     import mitsuba as mi
     import numpy as np
 
+    variant, _, robust = variant.partition("+")
     mi.set_variant(variant)
     drjit.set_thread_count(1)
-    scene = mi.load_file(scene, resx=SIDE, resy=SIDE, max_depth=DEPTH)
+    text = pathlib.Path(scene).read_text()
+    if robust:
+        text = re.sub(r"<scene [^>]*>", r'\g<0><boolean name="embree_use_robust_intersections" value="true"/>', text)
+    mi.file_resolver().append(str(pathlib.Path(scene).parent))
+    scene = mi.load_string(text, resx=SIDE, resy=SIDE, max_depth=DEPTH)
     spp = BUDGETS[1] - BUDGETS[0]
 
     def render(seed):
@@ -92,7 +99,7 @@ def main():
     parser.add_argument("--relt", default="relt")
     parser.add_argument("--scene", default=str(SCENES / "bitterli-cornell-box/scene.xml"))
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--variants", default="llvm_ad_rgb,scalar_rgb")
+    parser.add_argument("--variants", default="llvm_ad_rgb,llvm_ad_rgb+robust,scalar_rgb")
     parser.add_argument("--alone", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.alone:
@@ -114,7 +121,7 @@ def main():
     for name, values in found.items():
         median = statistics.median(values)
         by = ", ".join(f"{median / statistics.median(found[rival]):.2f} × {rival}" for rival in rivals)
-        print(f"{name:22} {median / 1e6:.3f} ({min(values) / 1e6:.3f}, {max(values) / 1e6:.3f})  {by}")
+        print(f"{name:29} {median / 1e6:.3f} ({min(values) / 1e6:.3f}, {max(values) / 1e6:.3f})  {by}")
 
 
 if __name__ == "__main__":

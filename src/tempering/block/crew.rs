@@ -1,16 +1,15 @@
 //! Blocks in one batch.
 
+use arrayvec::ArrayVec;
+
 use super::{
-    super::{
-        Canvas, Round,
-        steps::{self, SCALES},
-    },
-    Batch, Block,
+    super::{Canvas, Round, steps},
+    Batch, Block, Seated, Work,
 };
-use crate::{
-    chain::{Target, Walkers},
-    sample::StepLaw,
-};
+use crate::chain::{Target, Walkers};
+
+/// Blocks in a crew, at most.
+pub const MOST_BLOCKS: usize = 64;
 
 /// Blocks that go through sweeps together, their lanes in one batch: what comes out is what each would have come to
 /// by itself, but packets of rays are fuller.
@@ -22,7 +21,7 @@ pub struct Crew<'b, W: Default + Send> {
 }
 
 impl<'b, W: Default + Send> Crew<'b, W> {
-    /// At least one block; several if all [can join](Block::can_join).
+    /// One block or several, at most [`MOST_BLOCKS`], if all [can join](Block::can_join).
     pub fn new(blocks: Vec<&'b mut Block<W>>) -> Crew<'b, W> {
         let mut crew = Crew { blocks, batches: Vec::new() };
         crew.batches = match &mut crew.blocks[..] {
@@ -34,12 +33,16 @@ impl<'b, W: Default + Send> Crew<'b, W> {
 
     /// Goes through `sweeps` sweeps.
     pub fn advance<T: Target<Workspace = W>>(&mut self, target: &T, sweeps: u64, canvas: &Canvas, round: &Round) {
-        let bank = steps::bank();
+        let work = Work { target, canvas, round, bank: &steps::bank() };
         let Crew { blocks, batches } = self;
         for _ in 0..sweeps {
             match &mut blocks[..] {
-                [block] => block.explore(batches, target, canvas, round, &bank),
-                blocks => explore_together(blocks, &mut batches[0], target, canvas, round, &bank),
+                [block] => block.explore(batches, &work),
+                blocks => {
+                    let mut seated: ArrayVec<Seated, MOST_BLOCKS> =
+                        blocks.iter_mut().map(|block| block.seated()).collect();
+                    batches[0].explore(&mut seated, &work);
+                }
             }
             blocks.iter_mut().for_each(|block| block.exchange(batches, canvas, round));
         }
@@ -81,32 +84,4 @@ fn join<W: Default + Send>(blocks: &mut [&mut Block<W>]) -> Batch<W> {
     }
     let walkers = Walkers::joined(blocks.iter().map(|block| &block.batches[0].walkers));
     Batch { walkers, ..blocks[0].batch(counters.concat()) }
-}
-
-/// Moves all replicas of several blocks and draws all their offers, in one batch.
-fn explore_together<W: Default + Send, T: Target<Workspace = W>>(
-    blocks: &mut [&mut Block<W>],
-    batch: &mut Batch<W>,
-    target: &T,
-    canvas: &Canvas,
-    round: &Round,
-    bank: &[StepLaw; SCALES],
-) {
-    if target.changes_techniques() {
-        for block in blocks.iter_mut() {
-            block.parts[0].warm(batch, round, &block.rung, block.sweeps);
-        }
-        batch.change_techniques(target);
-        for block in blocks.iter_mut() {
-            block.parts[0].settle_changes(batch, canvas, round, &block.rung);
-        }
-    }
-    for block in blocks.iter_mut() {
-        let mixes = &round.mixes[block.trial()];
-        block.parts[0].propose(batch, (bank, mixes), &block.rung, block.sweeps);
-    }
-    batch.evaluate(target);
-    for block in blocks.iter_mut() {
-        block.parts[0].settle(batch, canvas, round, &block.rung, block.sweeps);
-    }
 }

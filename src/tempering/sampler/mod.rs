@@ -28,6 +28,7 @@ use sharing::Share;
 use super::{
     Block, Canvas, Choices, Combine, Crew, Histogram, Ladder, LadderChoice, Layers, PointGroups, ProbeMap, Probes,
     Round, RoundReport, Sum, Tally, Weights,
+    block::MOST_BLOCKS,
     independent::{Independent, Use},
     probes::TRIALS,
     steps::{self, StepCount},
@@ -66,7 +67,7 @@ fn portions_together<W: Default + Send>(portions: &[Portion<W>]) -> usize {
     }
     let lanes = blocks().map(Block::lanes).max().unwrap_or(LANES_TOGETHER);
     let at_most = portions.len() / (TURNS_A_THREAD * rayon::current_num_threads());
-    LANES_TOGETHER.div_ceil(lanes).min(at_most).max(1)
+    LANES_TOGETHER.div_ceil(lanes).min(at_most).clamp(1, MOST_BLOCKS)
 }
 
 /// Replica exchange at work on one target.

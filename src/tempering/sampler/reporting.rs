@@ -3,7 +3,7 @@
 use super::{Learnt, Sampler};
 use crate::tempering::{
     Estimate, LnEstimate, Normaliser, NormaliserEstimates, RoundReport, RungCounts, RungReport, ScaleReport,
-    agreement::split_r_hat, probes::TRIALS, steps, trips::Dwell,
+    agreement::Mixing, probes::TRIALS, steps, trips::Dwell,
 };
 
 /// β at which the local barrier is told.
@@ -22,7 +22,7 @@ impl<W: Default + Send> Sampler<W> {
         let chains = ladders > 0;
         let waits: f64 = rejection.iter().map(|r| r / (1.0 - r)).sum();
         let trips = |f: fn(&crate::tempering::trips::Trips) -> u64| blocks().map(|block| f(block.trips())).sum::<u64>();
-        let (split_r_hat, r_hat_halves) = self.split_r_hat();
+        let mixing = self.mixing();
         let index = blocks().find_map(|block| block.index());
         let grid = (0..BARRIER_POINTS).map(|i| i as f64 / (BARRIER_POINTS - 1) as f64);
         RoundReport {
@@ -57,8 +57,9 @@ impl<W: Default + Send> Sampler<W> {
             uniform_share: self.uniform_share(),
             offers: if chains { self.state.offers as u64 } else { 0 },
             chain_ratio: self.state.round.weights.ratio(),
-            split_r_hat,
-            r_hat_halves,
+            split_r_hat: mixing.r_hat_ln_g,
+            split_r_hat_image: mixing.r_hat_film,
+            r_hat_halves: mixing.halves,
             non_finite: self.state.faults.total(),
             rays: self.state.rays,
             rungs: if chains { self.rung_reports(learnt, &counts) } else { Vec::new() },
@@ -152,22 +153,23 @@ impl<W: Default + Send> Sampler<W> {
         sum
     }
 
-    /// Split R̂ of ln g on the target, with blocks of ladders in the place of chains, and the number of their halves.
-    fn split_r_hat(&self) -> (f64, usize) {
+    /// How far blocks of ladders agree on the target.
+    fn mixing(&self) -> Mixing {
         let top = self.state.round.ladder.chains();
-        let mut means = Vec::new();
+        let (mut means, mut whereabouts) = (Vec::new(), Vec::new());
         let mut within = crate::tempering::Histogram::default();
         let rungs = self.state.round.ladder.rungs();
         for block in self.portions.iter().filter_map(|portion| portion.ladders.as_ref()) {
             let mut counts = vec![RungCounts::default(); rungs];
             block.add_counts(&mut counts);
-            means.extend(counts[top].halves.iter().filter_map(|half| half.mean()));
+            means.extend(counts[top].halves.iter().filter_map(|half| half.mean()).map(|mean| [mean]));
+            whereabouts.extend(counts[top].whereabouts);
             let mut histograms = vec![crate::tempering::Histogram::default(); rungs];
             block.add_histograms(&mut histograms);
             within.merge(&histograms[top]);
         }
         let sd = within.mean_and_sd().map_or(f64::NAN, |(_, sd)| sd);
-        (split_r_hat(&means, sd), means.len())
+        Mixing::of(&means, sd * sd, &whereabouts)
     }
 }
 
