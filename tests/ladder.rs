@@ -189,7 +189,7 @@ fn the_terminal_has_it_all_in_80_columns() {
         "round 2 of 0 to 2",
         "4 replicas on 64 ladders",
         "\n1234 round trips (1602 predicted), 1500 restarts\n",
-        "\nlongest run of rejected mutations 312, split R̂ 1.004 of ln g and 1.009 of image blocks\n",
+        "\nlongest run of rejected mutations 312, split R̂ 1.004 (1.009 of image blocks)\n",
         "c = 0.2492 ± 2.5 % by mbar",
         "\n   4     1.000    -1.400    0.42",
         "\n1 and 2 ",

@@ -56,7 +56,7 @@ pub fn facts(log: &RunLog, round: &RoundReport) -> Vec<String> {
             round.restarts
         ),
         format!(
-            "longest run of rejected mutations {}, split R̂ {} of ln g and {} of image blocks",
+            "longest run of rejected mutations {}, split R̂ {} ({} of image blocks)",
             round.longest_rejection_run,
             significant(round.split_r_hat, 4),
             significant(round.split_r_hat_image, 4)
