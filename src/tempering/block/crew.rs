@@ -21,7 +21,7 @@ pub struct Crew<'b, W: Default + Send> {
 }
 
 impl<'b, W: Default + Send> Crew<'b, W> {
-    /// One block or several, at most [`MOST_BLOCKS`], if all [can join](Block::can_join).
+    /// One block or several, at most `MOST_BLOCKS`, if all [can join](Block::can_join).
     pub fn new(blocks: Vec<&'b mut Block<W>>) -> Crew<'b, W> {
         let mut crew = Crew { blocks, batches: Vec::new() };
         crew.batches = match &mut crew.blocks[..] {
