@@ -587,6 +587,9 @@ mod tests {
         near(layer(hot.own), [[0.4, 2.0], [0.0, 0.0]], "balanced points");
         near(layer(hot.elsewhere.unwrap()), [[0.0, 0.0], [1.2, 0.0]], "what they give elsewhere");
         near(layer(layers.tempered.unwrap()), [[0.05, 0.25], [0.15, 0.0]], "states");
+        // a quarter and three quarters of the state's luminance, which is on the target, by cells of four columns
+        let shares = tally.counts[1].whereabouts[0].means().expect("a state on the target");
+        near([[shares[9], shares[11]], [0.0; 2]], [[0.25, 0.75], [0.0; 2]], "where states are");
         let probed = |ratio, of: [usize; 2]| [0, 1].map(|probe| of.map(|i| probes.sums(ratio).0[probe][0][i]));
         near(probed(0, [0, 2]), [[1.0, 1.0], [3.0, 0.0]], "points and their number in probes");
         near(probed(EVEN, [1, 3]), [[0.1, 0.02], [0.3, 0.5 * (0.04 + 0.16)]], "states and their squares in probes");
