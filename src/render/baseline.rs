@@ -271,7 +271,7 @@ impl Engine for Mlt {
         let short = until.map_or(u64::MAX, |until| until.saturating_sub(done).div_ceil(self.plan.a_sweep()));
         let sweeps = sweeps.min(self.sweeps_left().unwrap_or(u64::MAX)).min(short);
         let (film, unit, own) = (&self.film, self.unit(), self.own());
-        self.blocks.par_iter_mut().enumerate().for_each(|(i, block)| {
+        self.blocks.par_iter_mut().enumerate().with_max_len(1).for_each(|(i, block)| {
             if !own.contains(&i) {
                 return block.chains.advance_elsewhere(sweeps);
             }

@@ -55,8 +55,10 @@ const MOST_AUTOMATIC: usize = 8;
 
 /// Lanes of ladders that are evaluated together where blocks have fewer.
 const LANES_TOGETHER: usize = 128;
-/// Turns of work that a thread has left at least where blocks go together, so that none waits long for another.
+/// Turns of work that a thread has at least where blocks go together, so that none waits long for another.
 const TURNS_A_THREAD: usize = 4;
+/// Towards the end of a slice crews get smaller, down to this part of their size: the last one is what others wait for.
+const SMALLEST_CREW: usize = 4;
 
 /// Portions that one thread works on at once: packets of rays are full only if blocks of few lanes go together. Nothing that
 /// is computed depends on it.
@@ -68,6 +70,19 @@ fn portions_together<W: Default + Send>(portions: &[Portion<W>]) -> usize {
     let lanes = blocks().map(Block::lanes).max().unwrap_or(LANES_TOGETHER);
     let at_most = portions.len() / (TURNS_A_THREAD * rayon::current_num_threads());
     LANES_TOGETHER.div_ceil(lanes).min(at_most).clamp(1, MOST_BLOCKS)
+}
+
+/// Portions in crews of at most so many, in the order in which threads shall take them.
+fn crews<W>(mut portions: &mut [Portion<W>], together: usize) -> Vec<&mut [Portion<W>]> {
+    let mut crews = Vec::new();
+    while !portions.is_empty() {
+        let a_turn = portions.len() / (2 * rayon::current_num_threads());
+        let size = a_turn.clamp(together.div_ceil(SMALLEST_CREW), together).min(portions.len());
+        let (crew, rest) = std::mem::take(&mut portions).split_at_mut(size);
+        crews.push(crew);
+        portions = rest;
+    }
+    crews
 }
 
 /// Replica exchange at work on one target.
@@ -420,7 +435,7 @@ impl<W: Default + Send> Sampler<W> {
         match &mut self.portions[own.clone()] {
             // on this very thread, which then may wait for others that share it
             [portion] => work(std::slice::from_mut(portion)),
-            portions => portions.par_chunks_mut(together).for_each(work),
+            portions => crews(portions, together).into_iter().par_bridge().for_each(work),
         }
         let drawn = sweeps * (self.portions.len() * self.state.schedule.points) as u64;
         let drawn_here = if group.is_first() { sweeps * (own.len() * self.state.schedule.points) as u64 } else { 0 };
