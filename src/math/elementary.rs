@@ -2,19 +2,47 @@
 
 use glam::Vec3;
 
+/// `x` rounded down, for 0 ≤ `x` < 2²³. `as` gives the same, but it saturates, for which there are no vector instructions before
+/// AVX-512; in loops over lanes this becomes such.
+#[inline(always)]
+fn rounded_down(x: f32) -> i32 {
+    /// From here on all numbers are whole, up to twice as much bit by bit.
+    const WHOLE: f32 = 8_388_608.0; // 2²³
+    let nearest = x + WHOLE;
+    let too_much = nearest - WHOLE > x;
+    (nearest.to_bits().wrapping_sub(WHOLE.to_bits()) as i32).wrapping_sub(i32::from(too_much))
+}
+
+/// The same for 0 ≤ `x` < 2³².
+#[inline(always)]
+fn rounded_down_large(x: f32) -> u32 {
+    const PART: f32 = 65_536.0;
+    let high = rounded_down(x * (1.0 / PART));
+    let low = rounded_down(x - high as f32 * PART);
+    ((high as u32) << 16).wrapping_add(low as u32)
+}
+
+/// `x` without its fraction; within ±2³¹ less a step of `f32`, if it is beyond that.
+#[inline(always)]
+fn truncated(x: f32) -> i32 {
+    const LARGEST: f32 = 2_147_483_520.0;
+    let whole = rounded_down_large(x.abs().min(LARGEST)) as i32;
+    if x < 0.0 { whole.wrapping_neg() } else { whole }
+}
+
 /// Sine and cosine of 2π·`turn` for `turn` in [−1/8, 1].
 ///
 /// Octant reduction and Taylor polynomials on |θ| ≤ π/4; absolute error below 3·10⁻⁷. Own code because the C
 /// library's results differ between its versions and processors, and images must not.
 #[inline(always)]
 pub fn sin_cos_turn(turn: f32) -> (f32, f32) {
-    let q = (4.0 * turn + 0.5) as i32; // not negative, so truncation rounds down
+    let q = rounded_down(4.0 * turn + 0.5);
     let x = (4.0 * turn - q as f32) * std::f32::consts::FRAC_PI_2; // within ±π/4
     let x2 = x * x;
     let sin = x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0))));
     let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40320.0))));
     let (s, c) = if q & 1 == 0 { (sin, cos) } else { (cos, sin) };
-    (if q & 2 == 0 { s } else { -s }, if (q + 1) & 2 == 0 { c } else { -c })
+    (if q & 2 == 0 { s } else { -s }, if q.wrapping_add(1) & 2 == 0 { c } else { -c })
 }
 
 /// exp(−ln 2 · `x`) · 2³² as an integer, for `x` in [1, 32): the magnitude of a step on the torus of u32.
@@ -23,13 +51,13 @@ pub fn sin_cos_turn(turn: f32) -> (f32, f32) {
 /// same step forwards and backwards is what detailed balance needs).
 #[inline(always)]
 pub fn ln2_scaled_exp(x: f32) -> u32 {
-    let whole = x as i32;
+    let whole = rounded_down(x);
     let f = whole as f32 - x; // in (−1, 0]
     let p = 1.0
         + f * (std::f32::consts::LN_2
             + f * (0.240_226_5 + f * (0.055_504_1 + f * (0.009_618_1 + f * (0.001_333_4 + f * 0.000_154)))));
     let scale = f32::from_bits(((127 + 32 - whole) as u32) << 23);
-    (p * scale) as u32
+    rounded_down_large(p * scale)
 }
 
 /// Where a coordinate counts as near zero in [`offset_origin`].
@@ -48,7 +76,7 @@ pub fn offset_origin(p: Vec3, normal: Vec3) -> Vec3 {
     #[inline(always)]
     fn shift(p: f32, n: f32) -> f32 {
         // both ways, and one of them taken: no branch, for loops over lanes
-        let ulps = (ULPS * n) as i32;
+        let ulps = truncated(ULPS * n);
         let far = f32::from_bits((p.to_bits() as i32).wrapping_add(if p < 0.0 { -ulps } else { ulps }) as u32);
         if p.abs() < NEAR_ZERO { p + FLOAT_SCALE * n } else { far }
     }
@@ -80,6 +108,28 @@ mod tests {
             assert!((f64::from(s) - angle.sin()).abs() < 5e-7, "sin 2π·{turn} = {s}");
             assert!((f64::from(c) - angle.cos()).abs() < 5e-7, "cos 2π·{turn} = {c}");
         }
+    }
+
+    /// Everywhere between whole numbers and right at them, at all magnitudes.
+    #[test]
+    fn numbers_are_rounded_as_the_language_rounds_them() {
+        for exponent in -3..32 {
+            for i in 0..5000 {
+                let x = 2f32.powi(exponent) * (1.0 + i as f32 / 5000.0);
+                for x in [x, x.floor(), x.floor().next_down(), x.floor().next_up()] {
+                    if (0.0..8_388_608.0).contains(&x) {
+                        assert_eq!(rounded_down(x), x as i32, "{x}");
+                    }
+                    if (0.0..4_294_967_296.0).contains(&x) {
+                        assert_eq!(rounded_down_large(x), x as u32, "{x}");
+                    }
+                    for x in [x, -x] {
+                        assert_eq!(truncated(x), x.clamp(-2_147_483_520.0, 2_147_483_520.0) as i32, "{x}");
+                    }
+                }
+            }
+        }
+        assert_eq!([0.0, -0.0].map(rounded_down), [0; 2]);
     }
 
     #[test]

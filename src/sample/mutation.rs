@@ -25,7 +25,11 @@ impl StepLaw {
     /// Moves each dimension of `from` by a step of its own, each made from one random word.
     #[inline(always)]
     pub fn step(&self, from: Block, random: [u32; 4]) -> Block {
-        std::array::from_fn(|i| from[i].wrapping_add(self.displacement(random[i])))
+        let mut to = from; // by a loop that becomes vector instructions
+        for (to, random) in to.iter_mut().zip(random) {
+            *to = to.wrapping_add(self.displacement(random));
+        }
+        to
     }
 
     /// One signed displacement as an element of the torus: the lowest bit is the sign, the rest the size.
