@@ -599,17 +599,20 @@ mod tests {
             let settings = Settings { packet, mutations_per_pixel: Some(512.0), ..Settings::default() };
             let job = Job { scene: &scene, scene_name: String::new(), settings, stop: &AtomicBool::new(false) };
             let slow = Slow { at: 60_000, stops_the_clock, seen: Mutex::default() };
+            let begin = std::time::Instant::now();
             let status = run(&job, &slow).unwrap().status;
+            let beside = begin.elapsed() - status.elapsed;
             let SetUp { bootstrap, adaptation, .. } = status.set_up;
             assert!(!bootstrap.is_zero() && !adaptation.is_zero(), "{:?}", status.set_up);
             assert!(bootstrap + adaptation <= status.elapsed);
-            (slow.seen.into_inner().unwrap(), status.elapsed)
+            (slow.seen.into_inner().unwrap(), beside)
         };
-        let ((with, short), (without, long)) = (look(true), look(false));
+        let ((with, stopped), (without, gone_on)) = (look(true), look(false));
         assert_eq!(with, without, "the same moment of the same run");
         // a sweep of chains with their uniform points is some thousand evaluations
         assert!((60_000..70_000).contains(&with[0]), "{with:?}");
-        assert!(long >= Slow::LOOK && short + Slow::LOOK / 2 < long, "{short:?} and {long:?}");
+        // what the clock of the run leaves out: that of one run, as other work on the machine makes runs differ
+        assert!(stopped >= Slow::LOOK && gone_on < Slow::LOOK, "{stopped:?} and {gone_on:?}");
     }
 
     #[test]
