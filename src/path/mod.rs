@@ -6,6 +6,7 @@
 pub mod bidirectional;
 mod contribution;
 mod faults;
+mod lanes;
 mod layout;
 mod mapping;
 pub mod scalar;

@@ -1,6 +1,6 @@
 //! Cameras: a pinhole, a thin lens, parallel rays.
 
-use glam::{Affine3A, DMat3, Mat3A, Vec3, Vec3A, Vec3Swizzles};
+use glam::{Affine3A, DMat3, Mat3, Vec3, Vec3A, Vec3Swizzles};
 
 use super::description::{CameraDescription, FilmDescription, FovAxis, Lens, Projection};
 use crate::math::warp;
@@ -17,16 +17,21 @@ pub struct Camera {
     near: f32,
     far: f32,
     eye: Eye,
-    /// Inverse of the linear part M of `to_world`.
-    to_local: Mat3A,
+    /// The translation of `to_world`, its linear part M and the inverse of that, in vectors that loops over lanes can have
+    /// several of side by side.
+    position: Vec3,
+    linear: Mat3,
+    to_local: Mat3,
     /// What all densities have in common: 1/(|det M|·A), with the area A of the film in the coordinates of `corner`.
     density: f32,
 }
 
-/// Where rays come from.
+/// Where a camera's rays come from.
 #[derive(Clone, Copy, Debug)]
-enum Eye {
+pub(crate) enum Eye {
+    /// A point.
     Pinhole,
+    /// A thin lens.
     Lens(Lens),
     /// Infinitely far: rays are parallel.
     Infinite,
@@ -84,7 +89,9 @@ impl Camera {
             near: description.near_clip,
             far: description.far_clip,
             eye,
-            to_local: Mat3A::from_cols_array(&m.inverse().to_cols_array().map(|x| x as f32)),
+            position: description.to_world.translation.into(),
+            linear: description.to_world.matrix3.into(),
+            to_local: Mat3::from_cols_array(&m.inverse().to_cols_array().map(|x| x as f32)),
             density: (1.0 / (m.determinant() * area).abs()) as f32,
         }
     }
@@ -115,7 +122,7 @@ impl Camera {
 
     /// The ray from a place on the lens to the point in the plane of focus where the ray through its centre goes.
     fn ray_through(&self, lens: Lens, [x, y]: [f32; 2], place: [f32; 2]) -> Ray {
-        let on_lens = on_lens(lens, place);
+        let on_lens = Vec3A::from(on_lens(lens, place));
         let local = Vec3A::new(x, y, 1.0) - on_lens / lens.focus_distance;
         self.ray_from(self.to_world.transform_point3a(on_lens), local)
     }
@@ -138,17 +145,29 @@ impl Camera {
     /// outside the film, behind the eye or beyond the clipping planes.
     #[inline]
     pub fn sight(&self, p: Vec3, lens: [f32; 2]) -> Option<Sight> {
-        let seen = self.seen(p, lens);
+        let (sight, visible) = self.sight_anyhow(self.eye, p, lens);
+        visible.then_some(sight)
+    }
+
+    /// Where the rays come from.
+    #[inline(always)]
+    pub(crate) fn eye(&self) -> Eye {
+        self.eye
+    }
+
+    /// What [`sight`](Camera::sight) gives, and whether it gives it: without a branch for a given kind of `eye`, which must be
+    /// the camera's own, for loops over lanes.
+    #[inline(always)]
+    pub(crate) fn sight_anyhow(&self, eye: Eye, p: Vec3, lens: [f32; 2]) -> (Sight, bool) {
+        let seen = self.seen(eye, p, lens);
         let [x, y] = seen.picture;
         let film = [(self.corner[0] - x) / self.extent[0], (self.corner[1] - y) / self.extent[1]];
-        let clipped = seen.from_near > 0.0 && seen.from_near <= seen.reach;
-        let visible = seen.in_front && clipped && film.iter().all(|f| (0.0..1.0).contains(f));
-        visible.then(|| Sight {
-            film,
-            direction: seen.to_eye.into(),
-            distance: seen.from_near,
-            density: self.density * seen.spread,
-        })
+        let clipped = (seen.from_near > 0.0) & (seen.from_near <= seen.reach);
+        let inside = (film[0] >= 0.0) & (film[0] < 1.0) & (film[1] >= 0.0) & (film[1] < 1.0);
+        let visible = seen.in_front & clipped & inside;
+        let sight =
+            Sight { film, direction: seen.to_eye, distance: seen.from_near, density: self.density * seen.spread };
+        (sight, visible)
     }
 
     /// [`Sight::density`] at a point that is known to be seen through that place on the lens: how many rays, of one in
@@ -160,13 +179,19 @@ impl Camera {
     /// unit vector along the axis, it is |M z|/(|det M| A) everywhere.
     #[inline]
     pub fn density(&self, p: Vec3, lens: [f32; 2]) -> f32 {
-        self.density * self.seen(p, lens).spread
+        self.density_from(self.eye, p, lens)
+    }
+
+    /// The same for the camera's own kind of `eye`: without a branch, for loops over lanes.
+    #[inline(always)]
+    pub(crate) fn density_from(&self, eye: Eye, p: Vec3, lens: [f32; 2]) -> f32 {
+        self.density * self.seen(eye, p, lens).spread
     }
 
     #[inline(always)]
-    fn seen(&self, p: Vec3, lens: [f32; 2]) -> Seen {
-        match self.eye {
-            Eye::Pinhole => self.seen_from(p, Vec3A::ZERO, 0.0),
+    fn seen(&self, eye: Eye, p: Vec3, lens: [f32; 2]) -> Seen {
+        match eye {
+            Eye::Pinhole => self.seen_from(p, Vec3::ZERO, 0.0),
             Eye::Lens(of) => self.seen_from(p, on_lens(of, lens), 1.0 / of.focus_distance),
             Eye::Infinite => self.seen_from_afar(p),
         }
@@ -175,8 +200,8 @@ impl Camera {
     /// From a place in the plane of the eye, in the camera's coordinates; `per_focus` is 1 over the distance where all
     /// places see alike.
     #[inline(always)]
-    fn seen_from(&self, p: Vec3, place: Vec3A, per_focus: f32) -> Seen {
-        let to_eye = self.to_world.translation + self.to_world.matrix3 * place - Vec3A::from(p);
+    fn seen_from(&self, p: Vec3, place: Vec3, per_focus: f32) -> Seen {
+        let to_eye = self.position + self.linear * place - p;
         let local = -(self.to_local * to_eye);
         let distance = to_eye.length();
         let along = local / local.z;
@@ -195,8 +220,8 @@ impl Camera {
     /// By a parallel ray.
     #[inline(always)]
     fn seen_from_afar(&self, p: Vec3) -> Seen {
-        let local = self.to_local * (Vec3A::from(p) - self.to_world.translation);
-        let axis = self.to_world.matrix3.z_axis;
+        let local = self.to_local * (p - self.position);
+        let axis = self.linear.z_axis;
         let stretched = axis.length();
         Seen {
             picture: local.xy().into(),
@@ -216,7 +241,7 @@ struct Seen {
     /// Whether it is on the side of the eye that rays go to.
     in_front: bool,
     /// Unit direction.
-    to_eye: Vec3A,
+    to_eye: Vec3,
     /// How far the ray that reaches it has come from the near plane, and how far it goes.
     from_near: f32,
     reach: f32,
@@ -226,8 +251,8 @@ struct Seen {
 
 /// A place on the lens in the camera's coordinates, of one in the unit square.
 #[inline(always)]
-fn on_lens(lens: Lens, place: [f32; 2]) -> Vec3A {
-    Vec3A::from((warp::disk(place) * lens.aperture_radius).extend(0.0))
+fn on_lens(lens: Lens, place: [f32; 2]) -> Vec3 {
+    (warp::disk(place) * lens.aperture_radius).extend(0.0)
 }
 
 /// Half the width of the whole picture at distance 1, from the extent that the field of view spans.

@@ -19,6 +19,7 @@ mod surface;
 pub mod textures;
 
 pub use appearance::{Appearance, Mixture, Scattering, ScatteringRef};
+pub(crate) use camera::Eye;
 pub use camera::{Camera, Ray, Sight};
 pub use description::SceneDescription;
 pub use emitters::Emitters;

@@ -10,8 +10,8 @@ use super::{
 use crate::{
     path::vertex::{Connection, Decisions},
     scene::{
-        NO_LIGHT, Profile, Rgb, Scene, Surface,
-        lights::{Emission, EmitterKind, SHORT_OF_LIGHT},
+        NO_LIGHT, Profile, Rgb, Scene, Sight, Surface,
+        lights::{Emission, EmitterKind, LightSample, SHORT_OF_LIGHT},
         materials::Evaluation,
     },
 };
@@ -88,8 +88,8 @@ pub(super) fn next_event<P: Profile>(
     let light = scene.emitters.sample::<P>(site.p, site.lift, decisions.light_place, decisions.light)?;
     let wi = site.frame.to_local(light.wi);
     let Evaluation { value, pdf } = site.scattering.evaluate::<P>(site.wo, wi);
-    let contribution = end.carried.throughput * value * light.weight;
-    if contribution == Rgb::ZERO {
+    let (mut connection, lit) = looked_at(&light, end.carried.throughput * value);
+    if !lit {
         return None;
     }
     let ratio = if techniques.hit { f64::from(pdf / light.pdf) } else { 0.0 };
@@ -116,12 +116,17 @@ pub(super) fn next_event<P: Profile>(
         let place = f64::from(place);
         others += place * place * end.tail.others(f64::from(density), f64::from(back), techniques.has(2, j));
     }
-    Some(Connection {
-        origin: light.origin,
-        direction: light.wi,
-        tfar: light.tfar,
-        contribution: contribution * weight(others),
-    })
+    connection.contribution *= weight(others);
+    Some(connection)
+}
+
+/// The connection to a place on a light, unless it is black, where that part of its light is scattered. Without a branch, for
+/// loops over lanes.
+#[inline(always)]
+pub(super) fn looked_at(light: &LightSample, scattered: Rgb) -> (Connection, bool) {
+    let contribution = scattered * light.weight;
+    let connection = Connection { origin: light.origin, direction: light.wi, tfar: light.tfar, contribution };
+    (connection, contribution != Rgb::ZERO)
 }
 
 /// A splat that is waiting for its shadow ray.
@@ -145,23 +150,27 @@ pub(super) fn to_camera<P: Profile>(
         return None;
     }
     let sight = scene.camera.sight(site.p, lens)?;
-    let Evaluation { value, pdf } = site.scattering.evaluate::<P>(site.frame.to_local(sight.direction), site.wo);
+    let evaluation = site.scattering.evaluate::<P>(site.frame.to_local(sight.direction), site.wo);
     let density = sight.density * site.cos(sight.direction);
-    let contribution = arrival.flux * value * density;
-    if contribution == Rgb::ZERO {
+    let origin = site.start_towards(sight.direction);
+    let (mut seen, lit) = seen_at(&sight, origin, arrival.flux * evaluation.value * density);
+    if !lit {
         return None;
     }
-    let others = arrival.tail.others(f64::from(density), f64::from(pdf), techniques.has(j, 2));
-    let origin = site.start_towards(sight.direction);
-    Some(Seen {
-        film: sight.film,
-        connection: Connection {
-            origin,
-            direction: sight.direction,
-            tfar: sight.distance * SHORT_OF_LIGHT,
-            contribution: contribution * weight(others),
-        },
-    })
+    if techniques.weigh() {
+        let others = arrival.tail.others(f64::from(density), f64::from(evaluation.pdf), techniques.has(j, 2));
+        seen.connection.contribution *= weight(others);
+    }
+    Some(seen)
+}
+
+/// What is seen of a vertex of a light subpath from where rays towards the camera start, unless it is black. Without a branch,
+/// for loops over lanes.
+#[inline(always)]
+pub(super) fn seen_at(sight: &Sight, origin: Vec3, contribution: Rgb) -> (Seen, bool) {
+    let (direction, tfar) = (sight.direction, sight.distance * SHORT_OF_LIGHT);
+    let connection = Connection { origin, direction, tfar, contribution };
+    (Seen { film: sight.film, connection }, contribution != Rgb::ZERO)
 }
 
 /// s = t = 1: a place on a lamp, seen through a place on the lens.

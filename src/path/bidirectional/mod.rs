@@ -12,6 +12,7 @@ mod connections;
 mod inversion;
 mod lengths;
 pub mod scalar;
+mod side_by_side;
 mod subpath;
 mod techniques;
 mod views;
@@ -22,19 +23,19 @@ pub use lengths::{Chosen, Lengths};
 pub use techniques::Techniques;
 
 use connections::Seen;
-use subpath::{Arrival, CameraEnd, LightVertex, PLAIN, Particle, Site};
+use subpath::{Arrival, CameraEnd, LightEdge, LightVertex, PLAIN, Particle, Site};
 use weights::Step;
 
 use super::{
     Causes, Contribution, Contributions, FilmSplat, Mapping, Outcome, Workspace,
     tracing::{Kind, Tracing},
-    vertex::{Carried, Connection, Decisions},
+    vertex::{Carried, Connection, Decisions, Edge},
 };
 use crate::{
     embree::{Hits, MISS, Rays},
     rng::unit_f32,
     sample::{Move, Proposals},
-    scene::{Mixture, Profile, Rgb, Scattering, lights::Emission},
+    scene::{Mixture, NO_LIGHT, Profile, Rgb, Scattering, Surface, lights::Emission},
 };
 
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
@@ -68,6 +69,31 @@ pub(super) struct Arrays {
     /// Scattering functions of those that are not plain.
     mixtures: Vec<Mixture>,
     waiting: Waiting,
+    /// Vertices of either kind of subpath side by side; there from the first time on that there are any, but while they are
+    /// lent out.
+    light_group: Option<Box<side_by_side::light::Group>>,
+    camera_group: Option<Box<side_by_side::camera::Group>>,
+}
+
+impl Arrays {
+    /// The edge with which the `place`-th light subpath that goes on does so.
+    #[inline(always)]
+    fn go_on_from_light(&mut self, place: usize, lane: u32, edge: &LightEdge) {
+        self.lanes[place] = lane;
+        self.particles[place] = edge.particle;
+        self.steps[place] = edge.step;
+        self.rays.set(place, edge.origin, edge.direction, f32::MAX);
+    }
+
+    /// The edge with which the `place`-th camera subpath that goes on does so, `slot` being where its last one is.
+    #[inline(always)]
+    fn go_on_from_camera(&mut self, place: usize, [slot, lane]: [u32; 2], edge: &Edge, step: Step) {
+        self.lanes[place] = lane;
+        self.carried[place] = edge.carried;
+        self.specular[place] = self.specular[slot as usize] && edge.carried.pdf == f32::INFINITY;
+        self.steps[place] = step;
+        self.rays.set(place, edge.origin, edge.direction, f32::MAX);
+    }
 }
 
 /// Contributions that wait for their shadow rays.
@@ -294,66 +320,100 @@ fn keep_hits(w: &mut Arrays) {
 
 /// At every hit of a light subpath: the lens to connect to, and the next edge, which replaces the one that led here.
 fn scatter_light<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
-    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
-    let lanes = proposals.lanes();
-    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * lanes };
-    if techniques.inner && w.vertices.len() < row + lanes {
-        w.vertices.resize(row + lanes, LightVertex::NOWHERE);
+    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * proposals.lanes() };
+    if mapping.kind().techniques().inner && w.vertices.len() < row + proposals.lanes() {
+        w.vertices.resize(row + proposals.lanes(), LightVertex::NOWHERE);
     }
-    let mut kept = 0;
-    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
-        let (i, at) = (slot as usize, lane as usize);
-        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
-        let hit = w.hits.get(i).expect("misses are gone");
-        let surface = scene.surface::<P>(hit, origin, direction);
-        let particle = w.particles[i];
-        let arrival: Arrival = if j == 1 {
-            particle.arrive_from_light::<P>(scene, techniques, &w.emissions[i], &surface)
-        } else {
-            particle.arrive_after(&w.steps[i], origin, direction, &surface)
-        };
-        let site = Site::of(&surface);
-        let chosen = if HOW == ONE { w.chosen[at] } else { Chosen::NONE };
-        let last = HOW == ONE && chosen.light == j + 1;
-        if HOW != ONE || last && chosen.camera == 1 {
-            let seen = connections::to_camera::<P>(scene, techniques, &arrival, &site, w.lens[at], j);
-            if let Some(mut seen) = seen {
-                if HOW == ONE {
-                    seen.connection.contribution *= chosen.scale;
-                }
-                w.waiting.add_splat(lane, &seen);
-                if HOW == OPEN {
-                    w.waiting.chances.push(mapping.lengths().chance(j + 1, 1) / arrival.survival);
-                }
-            }
+    let kept = if P::FLAT_MESHES && !P::VARYING {
+        side_by_side::light::scatter_light::<P, HOW>(mapping, j, proposals, w)
+    } else {
+        let mut kept = 0;
+        let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
+        for (&slot, &lane) in slots.iter().zip(&lanes) {
+            kept = scatter_light_one::<P, HOW>(mapping, j, proposals, w, [slot, lane], kept);
         }
-        if techniques.inner && (HOW != ONE || last && chosen.camera > 1) {
-            let mixture = match &surface.scattering {
-                Scattering::Plain(_) => PLAIN,
-                Scattering::Mixed(mixture) => {
-                    w.mixtures.push(mixture.clone());
-                    w.mixtures.len() as u32 - 1
-                }
-            };
-            w.vertices[row + at] = LightVertex::new(&surface, mixture, &arrival);
-            w.kept[at] = if HOW == ONE { 1 } else { j };
-        }
-        if last || j + 1 == layout.max_depth() {
-            continue;
-        }
-        let block = proposals.block(layout.light_bounce(j - 1), at);
-        let decisions = Decisions::of_light(layout, j - 1, block, HOW != ONE);
-        if let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) {
-            w.lanes[kept] = lane;
-            w.particles[kept] = edge.particle;
-            w.steps[kept] = edge.step;
-            w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
-            kept += 1;
-        }
-    }
+        (w.hit_slots, w.hit_lanes) = (slots, lanes);
+        kept
+    };
     w.lanes.truncate(kept);
     w.particles.truncate(kept);
     w.rays.truncate(kept);
+}
+
+/// At one hit; returns how many subpaths have gone on then, `kept` before.
+#[inline(always)]
+fn scatter_light_one<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    [slot, lane]: [u32; 2],
+    kept: usize,
+) -> usize {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    let (i, at) = (slot as usize, lane as usize);
+    let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+    let hit = w.hits.get(i).expect("misses are gone");
+    let surface = scene.surface::<P>(hit, origin, direction);
+    let particle = w.particles[i];
+    let arrival: Arrival = if j == 1 {
+        particle.arrive_from_light::<P>(scene, techniques, &w.emissions[i], &surface)
+    } else {
+        particle.arrive_after(&w.steps[i], origin, direction, &surface)
+    };
+    let site = Site::of(&surface);
+    let last = is_last::<HOW>(w, lane, j);
+    if HOW != ONE || last && w.chosen[at].camera == 1 {
+        let seen = connections::to_camera::<P>(scene, techniques, &arrival, &site, w.lens[at], j);
+        if let Some(seen) = seen {
+            add_splat::<HOW>(mapping, j, w, lane, seen, arrival.survival);
+        }
+    }
+    if techniques.inner && (HOW != ONE || last && w.chosen[at].camera > 1) {
+        let mixture = match &surface.scattering {
+            Scattering::Plain(_) => PLAIN,
+            Scattering::Mixed(mixture) => {
+                w.mixtures.push(mixture.clone());
+                w.mixtures.len() as u32 - 1
+            }
+        };
+        keep_vertex::<HOW>(j, proposals, w, lane, LightVertex::new(&surface, mixture, &arrival));
+    }
+    if last || j + 1 == layout.max_depth() {
+        return kept;
+    }
+    let block = proposals.block(layout.light_bounce(j - 1), at);
+    let decisions = Decisions::of_light(layout, j - 1, block, HOW != ONE);
+    let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) else { return kept };
+    w.go_on_from_light(kept, lane, &edge);
+    kept + 1
+}
+
+/// Whether a light subpath is as long as its point chose when it has come to its vertex number `j`.
+#[inline(always)]
+fn is_last<const HOW: u8>(w: &Arrays, lane: u32, j: u16) -> bool {
+    HOW == ONE && w.chosen[lane as usize].light == j + 1
+}
+
+/// Keeps what is seen of a lane's vertex number `j` for its shadow ray; roulette has let the subpath come so far with
+/// the probability `survival`.
+#[inline(always)]
+fn add_splat<const HOW: u8>(mapping: &Mapping, j: u16, w: &mut Arrays, lane: u32, mut seen: Seen, survival: f32) {
+    if HOW == ONE {
+        seen.connection.contribution *= w.chosen[lane as usize].scale;
+    }
+    w.waiting.add_splat(lane, &seen);
+    if HOW == OPEN {
+        w.waiting.chances.push(mapping.lengths().chance(j + 1, 1) / survival);
+    }
+}
+
+/// Keeps a lane's vertex number `j`, to be joined with camera subpaths.
+#[inline(always)]
+fn keep_vertex<const HOW: u8>(j: u16, proposals: &Proposals, w: &mut Arrays, lane: u32, vertex: LightVertex) {
+    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * proposals.lanes() };
+    w.vertices[row + lane as usize] = vertex;
+    w.kept[lane as usize] = if HOW == ONE { 1 } else { j };
 }
 
 /// Traces the shadow rays of splats and puts those that are seen onto the lists of their lanes.
@@ -459,92 +519,152 @@ fn scatter_camera<P: Profile, const HOW: u8>(
     w: &mut Arrays,
     out: &mut Contributions,
 ) {
-    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
-    let lanes = proposals.lanes();
-    let bounce = j - 1;
-    let mut kept = 0;
-    for (&slot, &lane) in w.hit_slots.iter().zip(&w.hit_lanes) {
-        let (i, at) = (slot as usize, lane as usize);
-        let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
-        let hit = w.hits.get(i).expect("misses are gone");
-        let surface = scene.surface::<P>(hit, origin, direction);
-        let tail = if j == 1 {
-            subpath::arrive_from_eye(scene, &surface, direction, w.lens[at])
-        } else {
-            w.steps[i].arrive((surface.p - origin).length_squared(), surface.ng.dot(direction).abs())
-        };
-        let end = CameraEnd { carried: w.carried[i], tail };
-        let chosen = if HOW == ONE { w.chosen[at] } else { Chosen::NONE };
-        let scale = if HOW == ONE { chosen.scale } else { 1.0 };
-        let left_open = HOW != SUM && mapping.views_left_open() && w.specular[i];
-        if (HOW != ONE || chosen.is(0, j + 1)) && !left_open {
-            let radiance = connections::hit::<P>(scene, techniques, &surface, (origin, direction), &end, j);
-            if HOW == OPEN {
-                if radiance != Rgb::ZERO {
-                    let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
-                    out.outcomes.push(at, outcome(w.film[at], radiance, chance));
-                }
-            } else {
-                w.radiance[at] += radiance * scale;
-            }
+    let kept = if P::FLAT_MESHES && !P::VARYING {
+        side_by_side::camera::scatter_camera::<P, HOW>(mapping, j, proposals, w, out)
+    } else {
+        let mut kept = 0;
+        let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
+        for (&slot, &lane) in slots.iter().zip(&lanes) {
+            kept = scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, [slot, lane], kept);
         }
-        if j == layout.max_depth() {
-            continue;
-        }
-        let choices = layout.choices(bounce).map(|block| proposals.block(block, at));
-        let mut decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), at), choices);
-        let site = Site::of(&surface);
-        if HOW != ONE || chosen.is(1, j + 1) {
-            let connection = connections::next_event::<P>(scene, techniques, &site, &end, &decisions, j);
-            if let Some(mut connection) = connection {
-                connection.contribution *= scale;
-                w.waiting.add(lane, &connection);
-                if HOW == OPEN {
-                    w.waiting.chances.push(mapping.lengths().chance(1, j + 1) / end.carried.survival);
-                }
-            }
-        }
-        if techniques.inner
-            && w.kept[at] > 0
-            && (HOW != ONE || chosen.camera == j + 1)
-            && site.scattering.is_smooth::<P>()
-        {
-            // as many edges as both subpaths have, and the one between
-            let longest = if HOW == ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
-            for i in 1..=longest {
-                let vertex = &w.vertices[usize::from(i - 1) * lanes + at];
-                let light = vertex.site::<P>(scene, &w.mixtures);
-                let number = if HOW == ONE { chosen.light - 1 } else { i };
-                let ends = ((&vertex.arrival, &light, number), (&end, &site, j));
-                if let Some(mut connection) = connections::join::<P>(techniques, ends.0, ends.1) {
-                    connection.contribution *= scale;
-                    w.waiting.add(lane, &connection);
-                    if HOW == OPEN {
-                        let survival = vertex.arrival.survival * end.carried.survival;
-                        w.waiting.chances.push(mapping.lengths().chance(i + 1, j + 1) / survival);
-                    }
-                }
-            }
-        }
-        if HOW == ONE {
-            if chosen.camera == j + 1 {
-                continue;
-            }
-            decisions.survive();
-        }
-        if let Some((edge, step)) = subpath::scatter_camera::<P>(&surface, &end, &decisions, techniques, j) {
-            w.lanes[kept] = lane;
-            w.carried[kept] = edge.carried;
-            w.specular[kept] = w.specular[i] && edge.carried.pdf == f32::INFINITY;
-            w.steps[kept] = step;
-            w.rays.set(kept, edge.origin, edge.direction, f32::MAX);
-            kept += 1;
-        }
-    }
+        (w.hit_slots, w.hit_lanes) = (slots, lanes);
+        kept
+    };
     w.lanes.truncate(kept);
     w.carried.truncate(kept);
     w.specular.truncate(kept);
     w.rays.truncate(kept);
+}
+
+/// At one hit; returns how many subpaths have gone on then, `kept` before.
+#[inline(always)]
+fn scatter_camera_one<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    out: &mut Contributions,
+    [slot, lane]: [u32; 2],
+    kept: usize,
+) -> usize {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    let bounce = j - 1;
+    let (i, at) = (slot as usize, lane as usize);
+    let (origin, direction) = (w.rays.origin(i), w.rays.direction(i));
+    let hit = w.hits.get(i).expect("misses are gone");
+    let surface = scene.surface::<P>(hit, origin, direction);
+    let tail = if j == 1 {
+        subpath::arrive_from_eye(scene, &surface, direction, w.lens[at])
+    } else {
+        w.steps[i].arrive((surface.p - origin).length_squared(), surface.ng.dot(direction).abs())
+    };
+    let end = CameraEnd { carried: w.carried[i], tail };
+    if surface.light != NO_LIGHT {
+        collect_hit::<P, HOW>(mapping, j, w, out, [slot, lane], &surface, &end);
+    }
+    if j == layout.max_depth() {
+        return kept;
+    }
+    let choices = layout.choices(bounce).map(|block| proposals.block(block, at));
+    let mut decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), at), choices);
+    let site = Site::of(&surface);
+    if HOW != ONE || w.chosen[at].is(1, j + 1) {
+        let connection = connections::next_event::<P>(scene, techniques, &site, &end, &decisions, j);
+        if let Some(connection) = connection {
+            add_connection::<HOW>(mapping, w, lane, connection, [1, j + 1], end.carried.survival);
+        }
+    }
+    if site.scattering.is_smooth::<P>() {
+        join::<P, HOW>(mapping, j, proposals, w, lane, &end, &site);
+    }
+    if HOW == ONE {
+        if w.chosen[at].camera == j + 1 {
+            return kept;
+        }
+        decisions.survive();
+    }
+    let Some((edge, step)) = subpath::scatter_camera::<P>(&surface, &end, &decisions, techniques, j) else {
+        return kept;
+    };
+    w.go_on_from_camera(kept, [slot, lane], &edge, step);
+    kept + 1
+}
+
+/// Adds what a light sends to a camera subpath that hit it with its edge number `j`.
+fn collect_hit<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    w: &mut Arrays,
+    out: &mut Contributions,
+    [slot, lane]: [u32; 2],
+    surface: &Surface,
+    end: &CameraEnd,
+) {
+    let (i, at) = (slot as usize, lane as usize);
+    let left_open = HOW != SUM && mapping.views_left_open() && w.specular[i];
+    if left_open || HOW == ONE && !w.chosen[at].is(0, j + 1) {
+        return;
+    }
+    let edge = (w.rays.origin(i), w.rays.direction(i));
+    let radiance = connections::hit::<P>(mapping.scene(), mapping.kind().techniques(), surface, edge, end, j);
+    if HOW == OPEN {
+        if radiance != Rgb::ZERO {
+            let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
+            out.outcomes.push(at, outcome(w.film[at], radiance, chance));
+        }
+    } else {
+        w.radiance[at] += if HOW == ONE { radiance * w.chosen[at].scale } else { radiance };
+    }
+}
+
+/// Keeps a connection by the technique (s, t) for its shadow ray; roulette has let both subpaths come so far with the
+/// probability `survival`.
+#[inline(always)]
+fn add_connection<const HOW: u8>(
+    mapping: &Mapping,
+    w: &mut Arrays,
+    lane: u32,
+    mut connection: Connection,
+    [s, t]: [u16; 2],
+    survival: f32,
+) {
+    if HOW == ONE {
+        connection.contribution *= w.chosen[lane as usize].scale;
+    }
+    w.waiting.add(lane, &connection);
+    if HOW == OPEN {
+        w.waiting.chances.push(mapping.lengths().chance(s, t) / survival);
+    }
+}
+
+/// Connects vertex number `j` of a camera subpath, which scatters smoothly, to all vertices that are kept of the light's.
+#[inline(always)]
+fn join<P: Profile, const HOW: u8>(
+    mapping: &Mapping,
+    j: u16,
+    proposals: &Proposals,
+    w: &mut Arrays,
+    lane: u32,
+    end: &CameraEnd,
+    site: &Site,
+) {
+    let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
+    let at = lane as usize;
+    if !techniques.inner || w.kept[at] == 0 || HOW == ONE && w.chosen[at].camera != j + 1 {
+        return;
+    }
+    // as many edges as both subpaths have, and the one between
+    let longest = if HOW == ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
+    for i in 1..=longest {
+        let vertex = &w.vertices[usize::from(i - 1) * proposals.lanes() + at];
+        let light = vertex.site::<P>(scene, &w.mixtures);
+        let number = if HOW == ONE { w.chosen[at].light - 1 } else { i };
+        let survival = vertex.arrival.survival * end.carried.survival;
+        let ends = ((&vertex.arrival, &light, number), (end, site, j));
+        if let Some(connection) = connections::join::<P>(techniques, ends.0, ends.1) {
+            add_connection::<HOW>(mapping, w, lane, connection, [i + 1, j + 1], survival);
+        }
+    }
 }
 
 /// Turns radiances and splats into contributions and settles those that are not finite.

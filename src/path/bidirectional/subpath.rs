@@ -74,6 +74,12 @@ impl LightVertex {
         LightVertex { p, ng, lift, frame, wo, appearance, mixture, arrival: *arrival }
     }
 
+    /// On a plain material of a flat mesh.
+    #[inline(always)]
+    pub fn flat([p, ng]: [Vec3; 2], frame: Frame, wo: Vec3, appearance: u32, arrival: Arrival) -> LightVertex {
+        LightVertex { p, ng, lift: ng, frame, wo, appearance, mixture: PLAIN, arrival }
+    }
+
     /// A place to be filled.
     pub const NOWHERE: LightVertex = LightVertex {
         p: Vec3::ZERO,
@@ -124,7 +130,7 @@ pub(super) const LEAST_COSINE: f32 = 1e-9;
 
 impl Particle {
     #[inline(always)]
-    fn arrive(&self, cos: f32, tail: Tail) -> Arrival {
+    pub fn arrive(&self, cos: f32, tail: Tail) -> Arrival {
         Arrival { flux: self.flux / cos.max(LEAST_COSINE), tail, survival: self.survival }
     }
 
@@ -144,8 +150,7 @@ impl Particle {
     ) -> Arrival {
         let cos = surface.ng.dot(emission.direction).abs();
         let pdf_place = f64::from(emission.pdf_place);
-        let hit = if techniques.hit { 1.0 / (pdf_place * pdf_place) } else { 0.0 };
-        let mut step = Step { density: f64::from(emission.pdf_rest), cos: 1.0, before: 0.0, shorter: 1.0 };
+        let mut step = first_step(techniques, emission);
         let d2 = (surface.p - emission.origin).length_squared();
         let direct = |pdf: f32| {
             let ratio = f64::from(pdf) / pdf_place;
@@ -153,14 +158,11 @@ impl Particle {
         };
         let tail = match emission.kind {
             EmitterKind::Surface => {
-                let cos_light = emission.normals[0].dot(emission.direction).abs();
-                step.cos = f64::from(cos_light);
-                step.before = hit;
                 if !P::FLAT_MESHES {
                     // from where next-event estimation would look: on a sphere or off it makes a difference
                     let from = Site::of(surface).start_towards(-emission.direction);
                     let pdf = scene.emitters.pdf::<P>(emission.light, from, emission.origin, emission.normals[0]);
-                    step.shorter = direct(pdf * cos_light / d2);
+                    step.shorter = direct(pdf * step.cos as f32 / d2);
                 }
                 step.arrive(d2, cos)
             }
@@ -168,7 +170,6 @@ impl Particle {
             EmitterKind::Point => step.arrive(d2, cos),
             EmitterKind::SingleDirection => step.arrive_from_infinity(cos),
             EmitterKind::Surrounding => {
-                step.before = hit;
                 let towards = -emission.direction;
                 let pdf = scene.emitters.pdf::<P>(emission.light, surface.p, towards, towards);
                 step.shorter = direct(pdf);
@@ -184,6 +185,20 @@ impl Particle {
         let cos = surface.ng.dot(direction).abs();
         self.arrive(cos, step.arrive((surface.p - origin).length_squared(), cos))
     }
+}
+
+/// The first edge of a light subpath. From surfaces, next-event estimation chooses places as emission does, unless the
+/// vertex where the edge ends says otherwise.
+#[inline(always)]
+pub(super) fn first_step(techniques: Techniques, emission: &Emission) -> Step {
+    let pdf_place = f64::from(emission.pdf_place);
+    let hit = if techniques.hit { 1.0 / (pdf_place * pdf_place) } else { 0.0 };
+    let (cos, before) = match emission.kind {
+        EmitterKind::Surface => (emission.normals[0].dot(emission.direction).abs(), hit),
+        EmitterKind::Surrounding => (1.0, hit),
+        EmitterKind::Point | EmitterKind::SingleDirection => (1.0, 0.0),
+    };
+    Step { density: f64::from(emission.pdf_rest), cos: f64::from(cos), before, shorter: 1.0 }
 }
 
 /// Where the ray of an emission starts.
@@ -228,22 +243,33 @@ pub(super) fn scatter_light<P: Profile>(
         let there = site.scattering.evaluate::<P>(sample.wi, site.wo);
         (there.value / sample.pdf, Some([sample.pdf, there.pdf]))
     };
-    let mut particle = Particle { flux: arrival.flux * weight * cos, survival: arrival.survival };
-    if let Some(u) = decisions.roulette {
-        // the part of what arrived that leaves: both fluxes, but for the cosine that one of them was divided by
-        let cos_before = site.cos(site.frame.to_world(site.wo)).max(LEAST_COSINE);
-        let survival = (weight.max_element() * cos / cos_before).min(MOST_SURVIVAL);
-        if u >= survival {
-            return None;
-        }
-        particle.flux /= survival;
-        particle.survival *= survival;
-    }
-    if particle.flux == Rgb::ZERO {
+    let cos_before = site.cos(site.frame.to_world(site.wo));
+    let (particle, goes_on) = arrival.scattered(weight, [cos_before, cos], decisions.roulette);
+    if !goes_on {
         return None;
     }
     let step = arrival.tail.leave(densities, cos, techniques.has(j, 2));
     Some(LightEdge { origin: site.start_towards(direction), direction, particle, step })
+}
+
+impl Arrival {
+    /// What goes on where that `weight` is scattered, and whether anything does; the cosines are those of the edges before
+    /// and after by the geometric normal, and `u` is the number of roulette where it is played. Without a branch, for loops
+    /// over lanes.
+    #[inline(always)]
+    pub fn scattered(&self, weight: Rgb, [cos_before, cos]: [f32; 2], u: Option<f32>) -> (Particle, bool) {
+        let mut particle = Particle { flux: self.flux * weight * cos, survival: self.survival };
+        let mut goes_on = true;
+        if let Some(u) = u {
+            // the part of what arrived that leaves: both fluxes, but for the cosine that one of them was divided by
+            let survival = (weight.max_element() * cos / cos_before.max(LEAST_COSINE)).min(MOST_SURVIVAL);
+            goes_on = u < survival;
+            particle.flux /= survival;
+            particle.survival *= survival;
+        }
+        goes_on &= particle.flux != Rgb::ZERO;
+        (particle, goes_on)
+    }
 }
 
 /// A camera subpath at its last vertex.
@@ -257,7 +283,12 @@ pub(super) struct CameraEnd {
 #[inline(always)]
 pub(super) fn arrive_from_eye(scene: &Scene, surface: &Surface, direction: Vec3, lens: [f32; 2]) -> Tail {
     let cos = surface.ng.dot(direction).abs();
-    let density = scene.camera.density(surface.p, lens);
+    seen_with(scene.camera.density(surface.p, lens), cos)
+}
+
+/// The same where the camera's rays have that density per area, with |cos| of the geometric normal.
+#[inline(always)]
+pub(super) fn seen_with(density: f32, cos: f32) -> Tail {
     Step { density: f64::from(density), cos: 0.0, before: 0.0, shorter: 1.0 }.arrive(1.0, cos)
 }
 

@@ -42,6 +42,12 @@ impl Techniques {
         }
     }
 
+    /// Whether some paths can be made in several ways. Others need no weights.
+    #[inline(always)]
+    pub fn weigh(self) -> bool {
+        self.light && self.follow_camera() || self.hit && self.next_event
+    }
+
     /// Whether camera subpaths are followed beyond the lens.
     pub fn follow_camera(self) -> bool {
         self.hit || self.next_event || self.inner

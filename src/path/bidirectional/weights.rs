@@ -74,7 +74,7 @@ impl Tail {
     #[inline(always)]
     pub fn leave(&self, densities: Densities, cos: f32, compared: bool) -> Step {
         let ([forwards, back], smooth) = match densities {
-            Some(densities) => (densities.map(f64::from), 1.0),
+            Some([forwards, back]) => ([f64::from(forwards), f64::from(back)], 1.0),
             None => ([1.0; 2], 0.0),
         };
         let shorter = if compared { smooth * self.shorter } else { 0.0 };

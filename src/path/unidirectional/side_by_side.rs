@@ -13,40 +13,19 @@ use pulp::NullaryFnOnce;
 
 use super::{Arrays, Connection, Edge, shade_one, vertex};
 use crate::{
-    math::{Frame, place_within, warp},
+    math::Frame,
     path::{
         Mapping,
+        lanes::{Aims, N, Vectors, frame_and_back},
         vertex::{Carried, Decisions, Roulette},
     },
     sample::Proposals,
     scene::{
         NO_LIGHT, Profile, Scene,
-        lights::{LightSample, on_face, towards},
         materials::{Diffuse, Material, Scatter},
         on_triangle,
     },
 };
-
-/// Paths in a group: two vectors of AVX2.
-const N: usize = 16;
-
-/// Vectors in step.
-#[derive(Clone, Copy)]
-struct Vectors([[f32; N]; 3]);
-
-impl Vectors {
-    const ZERO: Vectors = Vectors([[0.0; N]; 3]);
-
-    #[inline(always)]
-    fn get(&self, j: usize) -> Vec3 {
-        Vec3::new(self.0[0][j], self.0[1][j], self.0[2][j])
-    }
-
-    #[inline(always)]
-    fn set(&mut self, j: usize, v: Vec3) {
-        [self.0[0][j], self.0[1][j], self.0[2][j]] = v.to_array();
-    }
-}
 
 /// Vertices of a group of paths, as a structure of arrays; truths are 0 or 1.
 pub(super) struct Group {
@@ -69,15 +48,8 @@ pub(super) struct Group {
     reflectance: Vectors,
     /// Primary samples: direction, place on the light, roulette.
     chosen_direction: [[f32; N]; 2],
-    chosen_place: [[f32; N]; 2],
+    aims: Aims,
     chosen_survival: [f32; N],
-    /// The chosen triangles of lights: corner and edges, unit normal, and the range of the numbers that choose it.
-    face: [Vectors; 3],
-    face_normal: Vectors,
-    range: [[f32; N]; 2],
-    radiance: Vectors,
-    inverse_area: [f32; N],
-    probability: [f32; N],
     /// Connections to lights, and whether there are any.
     connected: [u32; N],
     shadow_origin: Vectors,
@@ -109,14 +81,8 @@ impl Default for Group {
             diffuse: [0; N],
             reflectance: Vectors::ZERO,
             chosen_direction: [[0.0; N]; 2],
-            chosen_place: [[0.0; N]; 2],
+            aims: Aims::NONE,
             chosen_survival: [0.0; N],
-            face: [Vectors::ZERO; 3],
-            face_normal: Vectors::ZERO,
-            range: [[0.0; N]; 2],
-            radiance: Vectors::ZERO,
-            inverse_area: [0.0; N],
-            probability: [0.0; N],
             connected: [0; N],
             shadow_origin: Vectors::ZERO,
             shadow_direction: Vectors::ZERO,
@@ -169,7 +135,11 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
             if lit {
                 look_at_lights(g);
             }
-            scatter(roulette, g);
+            if roulette {
+                scatter::<true>(g)
+            } else {
+                scatter::<false>(g)
+            }
             for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
                 if !P::DIFFUSE && g.diffuse[j] == 0 {
                     kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
@@ -251,18 +221,8 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
         let choices = choices.map(|block| proposals.block(block, lane as usize));
         let decisions = Decisions::new(layout, bounce, proposals.block(first, lane as usize), choices);
         [g.chosen_direction[0][j], g.chosen_direction[1][j]] = decisions.direction;
-        [g.chosen_place[0][j], g.chosen_place[1][j]] = decisions.light_place;
         g.chosen_survival[j] = decisions.roulette.unwrap_or(0.0);
-        let Some(target) = scene.emitters.target(decisions.light_place[0], decisions.light) else { continue };
-        let [corner, e1, e2] = target.face.corner_and_edges;
-        g.face[0].set(j, corner);
-        g.face[1].set(j, e1);
-        g.face[2].set(j, e2);
-        g.face_normal.set(j, target.face.normal);
-        [g.range[0][j], g.range[1][j]] = target.face.range;
-        g.radiance.set(j, target.mesh.constant_radiance());
-        g.inverse_area[j] = target.mesh.inverse_area();
-        g.probability[j] = target.probability;
+        g.aims.fetch(j, scene, decisions.light_place, decisions.light);
     }
 }
 
@@ -270,16 +230,8 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
 #[inline(always)]
 fn look_at_lights(g: &mut Group) {
     for j in 0..N {
-        let within = place_within(g.chosen_place[0][j], [g.range[0][j], g.range[1][j]]);
-        let q = on_face(
-            [g.face[0].get(j), g.face[1].get(j), g.face[2].get(j)],
-            warp::triangle([within, g.chosen_place[1][j]]),
-        );
-        let normal = g.face_normal.get(j);
-        let sample = towards(g.p.get(j), g.ng.get(j), q, [normal, normal], g.radiance.get(j), g.inverse_area[j]);
-        let connection = sample.and_then(|sample| {
-            let light =
-                LightSample { weight: sample.weight / g.probability[j], pdf: sample.pdf * g.probability[j], ..sample };
+        let (light, shines) = g.aims.sample_anyhow(j, g.p.get(j), g.ng.get(j));
+        let connection = shines.then_some(light).and_then(|light| {
             let (frame, wo) = g.seen(j);
             let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
             vertex::connected(&light, evaluation, &g.carried(j))
@@ -295,12 +247,12 @@ fn look_at_lights(g: &mut Group) {
 
 /// Scattering and, where it is played, roulette.
 #[inline(always)]
-fn scatter(roulette: bool, g: &mut Group) {
+fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
         let (frame, wo) = g.seen(j);
         let chosen = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
         let (sample, above) = Diffuse { reflectance: g.reflectance.get(j) }.sample_anyhow(wo, chosen);
-        let u = roulette.then_some(g.chosen_survival[j]);
+        let u = ROULETTE.then_some(g.chosen_survival[j]);
         let from = (g.p.get(j), g.ng.get(j), &frame);
         let (edge, goes_on) = vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex);
         g.goes_on[j] = u32::from(above & goes_on);
@@ -317,9 +269,7 @@ impl Group {
     /// The frame on the side that is seen, and from where.
     #[inline(always)]
     fn seen(&self, j: usize) -> (Frame, Vec3) {
-        let ng = self.ng.get(j);
-        let frame = Frame::new(if self.flip[j] == 1 { -ng } else { ng });
-        (frame, frame.to_local(-self.direction.get(j)))
+        frame_and_back(self.ng.get(j), self.flip[j], self.direction.get(j))
     }
 
     /// What a path carried along the edge that led to its vertex, but for the density, which only emission needs.

@@ -142,8 +142,14 @@ pub(super) fn from_surface(q: Vec3, normals: [Vec3; 2], radiance: Rgb, pdf_area:
 /// The densities of [`from_surface`]: that of the place, and that of the direction, which is 0 behind either normal.
 #[inline(always)]
 pub(super) fn surface_pdf(pdf_area: f32, normals: [Vec3; 2], direction: Vec3) -> [f32; 2] {
+    [pdf_area, surface_direction_pdf(normals, direction)]
+}
+
+/// The second of them.
+#[inline(always)]
+pub(crate) fn surface_direction_pdf(normals: [Vec3; 2], direction: Vec3) -> f32 {
     let in_front = direction.dot(normals[1]) > 0.0;
-    [pdf_area, if in_front { warp::cosine_hemisphere_pdf(direction.dot(shining_side(normals))) } else { 0.0 }]
+    if in_front { warp::cosine_hemisphere_pdf(direction.dot(shining_side(normals))) } else { 0.0 }
 }
 
 /// From a point whose intensity in that direction, drawn with density `pdf` per solid angle, is `intensity`.

@@ -22,6 +22,7 @@ pub use constant::Constant;
 pub use cylinder::Cylinder;
 pub use directional::Directional;
 pub use disk::Disk;
+pub(crate) use emission::surface_direction_pdf;
 pub use emission::{Ball, Emission, EmissionInverse, EmitterKind};
 pub use envmap::Envmap;
 pub use mesh::MeshLight;
@@ -316,17 +317,25 @@ impl Light {
     }
 }
 
-/// A sample towards the point `q` of a surface that emits `radiance`, chosen with density `pdf_area`. Of the surface's
-/// normals the shading one tells the side that shines, as for rays that hit it, and the geometric one the density.
+/// What [`towards_anyhow`] gives, where it shines.
 #[inline(always)]
-pub(crate) fn towards(
+fn towards(p: Vec3, ng: Vec3, q: Vec3, normals: [Vec3; 2], radiance: Rgb, pdf_area: f32) -> Option<LightSample> {
+    let (sample, shines) = towards_anyhow(p, ng, q, normals, radiance, pdf_area);
+    shines.then_some(sample)
+}
+
+/// A sample towards the point `q` of a surface that emits `radiance`, chosen with density `pdf_area`. Of the surface's
+/// normals the shading one tells the side that shines, as for rays that hit it, and the geometric one the density. And whether it
+/// shines there: without a branch, for loops over lanes.
+#[inline(always)]
+pub(crate) fn towards_anyhow(
     p: Vec3,
     ng: Vec3,
     q: Vec3,
     [geometric, shading]: [Vec3; 2],
     radiance: Rgb,
     pdf_area: f32,
-) -> Option<LightSample> {
+) -> (LightSample, bool) {
     let origin = origin_towards(p, ng, q - p);
     let to = q - origin;
     let d2 = to.length_squared();
@@ -344,7 +353,7 @@ pub(crate) fn towards(
         light: 0,
     };
     let from_behind = (wi.dot(shading) >= 0.0) | (cos == 0.0) | (d2 <= 0.0);
-    (!from_behind).then_some(sample)
+    (sample, !from_behind)
 }
 
 /// A density per area as one per solid angle at `origin`: times distance² over the cosine at the light.
