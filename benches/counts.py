@@ -5,7 +5,8 @@
     counts.py shares [PROGRAM...]         share of the samples of a profile in relt's own code and in Embree (perf)
 
 Programs are builds of relt, `target/release/relt` without any; several are told side by side, such as one before a change
-and one after it. Scenes, methods and the rest are constants here; the mapping is the unidirectional one, on one thread.
+and one after it. `--mapping NAME`, `--scene NAME` and `--method NAME` (the latter two as often as you like) choose what runs: the
+unidirectional mapping, all scenes and all methods without them. One thread.
 
 Instructions are the difference of two budgets, so start-up, the reading of the scene and Embree's build count for
 nothing; with the same program they are the same from run to run but for what depends on time: a few in a thousand.
@@ -14,6 +15,7 @@ Valgrind's processor has AVX2 and no AVX-512. Packets are of 8 rays, as measurin
 Shares are of one short run each, start-up included, so what is told of relt's own code is too much rather than too little.
 """
 
+import argparse
 import pathlib
 import re
 import subprocess
@@ -30,10 +32,10 @@ LADDER = ["--replicas", "4", "--uniform-share", "0.5"]
 MPP = 24
 
 
-def render(program, scene, method, image, *options):
+def render(program, mapping, scene, method, image, *options):
     ladder = LADDER if method == "re" else []
     return [
-        program, "render", str(ROOT / "scenes" / scene / "scene.xml"), "--method", method, "--mapping", "unidirectional",
+        program, "render", str(ROOT / "scenes" / scene / "scene.xml"), "--method", method, "--mapping", mapping,
         "--threads", "1", "-q", "-o", image, *ladder, *options,
     ]  # fmt: skip
 
@@ -58,13 +60,13 @@ def of_objects(lines, program):
     return own, embree, other
 
 
-def instructions(program, scene, method, folder):
+def instructions(program, mapping, scene, method, folder):
     sums = []
     for budget in BUDGETS[method]:
         out = f"{folder}/counts"
         tool = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}"]
         options = [f"-Dres={SIDE}", "--packet", "8", "--mpp", str(budget)]
-        quietly([*tool, *render(program, scene, method, f"{folder}/image.exr", *options)])
+        quietly([*tool, *render(program, mapping, scene, method, f"{folder}/image.exr", *options)])
         sums.append(of_objects(by_object(out), program))
     mutations = SIDE * SIDE * (BUDGETS[method][1] - BUDGETS[method][0])
     return [(more - fewer) / mutations for fewer, more in zip(*sums)]
@@ -91,9 +93,9 @@ def by_object(path):
     return [(count, name or "") for name, count in counts.items()]
 
 
-def shares(program, scene, method, folder):
+def shares(program, mapping, scene, method, folder):
     data = f"{folder}/profile"
-    command = render(program, scene, method, f"{folder}/image.exr", "--mpp", str(MPP))
+    command = render(program, mapping, scene, method, f"{folder}/image.exr", "--mpp", str(MPP))
     quietly(["perf", "record", "-e", "cpu-clock", "-F", "1000", "-o", data, *command])
     text = quietly(["perf", "report", "-i", data, "--no-children", "--sort", "dso", "--stdio"])
     found = re.findall(r"^\s*([\d.]+)%\s+(\S+)", text, re.MULTILINE)
@@ -102,18 +104,22 @@ def shares(program, scene, method, folder):
 
 def main():
     tools = {"instructions": instructions, "shares": shares}
-    if len(sys.argv) < 2 or sys.argv[1] not in tools:
-        sys.exit(__doc__)
-    measure = tools[sys.argv[1]]
-    programs = sys.argv[2:] or [str(ROOT / "target/release/relt")]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tool", choices=tools)
+    parser.add_argument("programs", nargs="*", default=[str(ROOT / "target/release/relt")])
+    parser.add_argument("--mapping", default="unidirectional")
+    parser.add_argument("--scene", action="append", choices=SCENES)
+    parser.add_argument("--method", action="append", choices=METHODS)
+    asked = parser.parse_intermixed_args()
+    programs = asked.programs
     print("| scene | method |" + "".join(f" {program}: relt, Embree, others; Embree / all |" for program in programs))
     print("|---|---|" + "---|" * len(programs))
     with tempfile.TemporaryDirectory() as folder:
-        for scene in SCENES:
-            for method in METHODS:
+        for scene in asked.scene or SCENES:
+            for method in asked.method or METHODS:
                 cells = []
                 for program in programs:
-                    own, embree, other = measure(program, scene, method, folder)
+                    own, embree, other = tools[asked.tool](program, asked.mapping, scene, method, folder)
                     cells.append(f"{own:.0f}, {embree:.0f}, {other:.0f}; {embree / (own + embree + other):.2f}")
                 print(f"| `{scene}` | `{method}` | " + " | ".join(cells) + " |", flush=True)
 
