@@ -187,7 +187,7 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
             if !goes_on {
                 continue;
             }
-            let chosen = w.chosen.get(lane as usize).copied().filter(|_| HOW == ONE);
+            let chosen = (HOW == ONE).then(|| w.chosen[lane as usize]);
             if lit && g.connected[k] == 1 && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
                 add_connection::<HOW>(mapping, w, lane, g.connection(k), [1, j + 1], g.survival[k]);
             }

@@ -21,7 +21,7 @@ use crate::{
     },
     sample::Proposals,
     scene::{
-        Camera, Eye, Profile, Rgb, Scene, Sight,
+        Camera, Eye, Profile, Scene, Sight,
         materials::{Diffuse, Evaluation, Material, Scatter},
         on_triangle,
     },
@@ -397,14 +397,13 @@ impl Group {
 
     #[inline(always)]
     fn splat(&self, j: usize) -> Seen {
-        let contribution: Rgb = self.contribution.get(j);
         Seen {
             film: [self.film[0][j], self.film[1][j]],
             connection: Connection {
                 origin: self.shadow_origin.get(j),
                 direction: self.shadow_direction.get(j),
                 tfar: self.shadow_end[j],
-                contribution,
+                contribution: self.contribution.get(j),
             },
         }
     }
