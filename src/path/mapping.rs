@@ -89,8 +89,6 @@ impl MappingKind {
 }
 
 type Evaluate = fn(&Mapping, &mut Proposals, &mut Contributions, &mut Workspace);
-/// Goes through the point of a lane, with its choice left open or not.
-type Walk = fn(&Mapping, &mut Proposals, (usize, bool), &mut Narration) -> (Contribution, Elsewhere, Causes);
 
 /// The mapping of one scene.
 pub struct Mapping<'s> {
@@ -104,7 +102,6 @@ pub struct Mapping<'s> {
     views_left_open: bool,
     evaluate: Evaluate,
     evaluate_open: Option<Evaluate>,
-    walk: Walk,
     /// An evaluation to look out for, where somebody asked for one.
     watch: Option<Watch>,
     /// The rays of all batches, where somebody asked for them.
@@ -164,7 +161,7 @@ impl<'s> Mapping<'s> {
     /// The mapping by a given kernel, which must do all that the scene needs.
     pub fn with_kernel(scene: &'s Scene, kind: MappingKind, widths: Widths, kernel: Kernel) -> Mapping<'s> {
         assert!(kernel >= scene.features.kernel(), "the scene needs more than {kernel:?}");
-        let (evaluate, open, walk): (Evaluate, Evaluate, Walk) = match kernel {
+        let (evaluate, open): (Evaluate, Evaluate) = match kernel {
             Kernel::Diffuse => kernels::<DiffuseProfile>(kind),
             Kernel::Flat => kernels::<FlatProfile>(kind),
             Kernel::Plain => kernels::<PlainProfile>(kind),
@@ -181,7 +178,6 @@ impl<'s> Mapping<'s> {
             views_left_open: false,
             evaluate,
             evaluate_open: (kind == MappingKind::Multiplexed).then_some(open),
-            walk,
             watch: None,
             record: None,
         }
@@ -321,7 +317,11 @@ impl<'s> Mapping<'s> {
         (lane, open): (usize, bool),
         narration: &mut Narration,
     ) -> (Contribution, Elsewhere, Causes) {
-        (self.walk)(self, proposals, (lane, open), narration)
+        if self.kind == MappingKind::Unidirectional {
+            let (contribution, causes) = scalar::walk(self.scene, &self.layout, proposals, lane, narration);
+            return (contribution, Elsewhere::new(1), causes);
+        }
+        bidirectional::scalar::walk(self, proposals, (lane, open), narration)
     }
 
     /// Goes through an evaluation once more: what it contributes, there and elsewhere, why that had to be settled, and all
@@ -359,9 +359,9 @@ pub struct Retraced {
     pub events: Vec<Event>,
 }
 
-/// The batch, the batch of open points, and what goes through one point.
-fn kernels<P: Profile>(kind: MappingKind) -> (Evaluate, Evaluate, Walk) {
-    (evaluate::<P>(kind), bidirectional::open::<P>, walk::<P>(kind))
+/// The batch, and the batch of open points.
+fn kernels<P: Profile>(kind: MappingKind) -> (Evaluate, Evaluate) {
+    (evaluate::<P>(kind), bidirectional::open::<P>)
 }
 
 fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
@@ -369,15 +369,5 @@ fn evaluate<P: Profile>(kind: MappingKind) -> Evaluate {
         MappingKind::Unidirectional => unidirectional::evaluate::<P>,
         MappingKind::Multiplexed => bidirectional::multiplexed::<P>,
         _ => bidirectional::evaluate::<P>,
-    }
-}
-
-fn walk<P: Profile>(kind: MappingKind) -> Walk {
-    match kind {
-        MappingKind::Unidirectional => |mapping, proposals, (lane, _), narration| {
-            let (contribution, causes) = scalar::walk::<P>(mapping.scene, &mapping.layout, proposals, lane, narration);
-            (contribution, Elsewhere::new(1), causes)
-        },
-        _ => bidirectional::scalar::walk::<P>,
     }
 }

@@ -1,7 +1,7 @@
 //! From points of the unit cube to light paths and what they contribute.
 //!
 //! [`Mapping`] evaluates batches: `unidirectional` camera paths, or [`bidirectional`] paths from both ends.
-//! [`scalar`] and [`bidirectional::scalar`] say the same for one point at a time, to be read and tested against.
+//! `scalar` and `bidirectional::scalar` say the same for one point at a time ([`Mapping::walk`]), to be read and tested against.
 
 pub mod bidirectional;
 mod contribution;
@@ -9,7 +9,7 @@ mod faults;
 mod lanes;
 mod layout;
 mod mapping;
-pub mod scalar;
+mod scalar;
 mod tracing;
 mod unidirectional;
 mod vertex;

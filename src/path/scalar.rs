@@ -8,24 +8,18 @@ use super::{
 use crate::{
     rng::unit_f32,
     sample::Proposals,
-    scene::{NO_LIGHT, Profile, Rgb, Scene, Surface},
+    scene::{FullProfile, NO_LIGHT, Rgb, Scene, Surface},
 };
 
-/// Evaluates the proposal of one lane. The second value says whether the contribution had to be settled, and why.
+/// Nothing is left out: what is said of one point holds for every kernel, and time is of no concern.
+type P = FullProfile;
+
+/// Evaluates the proposal of one lane and tells how. The second value says whether the contribution had to be settled, and
+/// why.
 ///
 /// f = Σ over the vertices of the camera path of emission and next-event estimates, each weighted by the power
 /// heuristic; unbiased for the measurement of the film position that block 0 names.
-pub fn evaluate<P: Profile>(
-    scene: &Scene,
-    layout: &Layout,
-    proposals: &mut Proposals,
-    lane: usize,
-) -> (Contribution, Causes) {
-    walk::<P>(scene, layout, proposals, lane, &mut Narration::unheard())
-}
-
-/// The same, told to somebody on the way.
-pub(super) fn walk<P: Profile>(
+pub(super) fn walk(
     scene: &Scene,
     layout: &Layout,
     proposals: &mut Proposals,
@@ -48,7 +42,7 @@ pub(super) fn walk<P: Profile>(
         let Some(hit) = scene.tracer.closest_one(ray.origin, ray.direction, ray.tfar) else {
             let found = vertex::background::<P>(scene, ray.direction, &carried);
             radiance += found;
-            narration.tell(|| tell_background::<P>(scene, &ray.direction, &carried, found, radiance, at.1));
+            narration.tell(|| tell_background(scene, &ray.direction, &carried, found, radiance, at.1));
             break;
         };
         let surface = scene.surface::<P>(hit, ray.origin, ray.direction);
@@ -56,7 +50,7 @@ pub(super) fn walk<P: Profile>(
         let found = vertex::emission::<P>(scene, &surface, ray.origin, &carried);
         radiance += found;
         if surface.light != NO_LIGHT {
-            narration.tell(|| tell_emission::<P>(scene, &surface, ray.origin, &carried, found, radiance, at.1));
+            narration.tell(|| tell_emission(scene, &surface, ray.origin, &carried, found, radiance, at.1));
         }
         if bounce + 1 == layout.max_depth() {
             narration.tell(|| walk::ended(at, "paths are no longer"));
@@ -69,7 +63,7 @@ pub(super) fn walk<P: Profile>(
             if seen {
                 radiance += c.contribution;
             }
-            narration.tell(|| tell_connection::<P>(scene, &surface, &carried, &decisions, (&c, seen), radiance, at.1));
+            narration.tell(|| tell_connection(scene, &surface, &carried, &decisions, (&c, seen), radiance, at.1));
         }
         let Some(edge) = vertex::scatter::<P>(&surface, &carried, &decisions, Roulette::Vertex) else {
             narration.tell(|| {
@@ -88,7 +82,7 @@ pub(super) fn walk<P: Profile>(
 }
 
 /// Light from beyond the scene, at the end of edge number `edges`.
-fn tell_background<P: Profile>(
+fn tell_background(
     scene: &Scene,
     direction: &glam::Vec3,
     carried: &Carried,
@@ -113,7 +107,7 @@ fn tell_background<P: Profile>(
 }
 
 /// Light of the surface that an edge hits, vertex number `j`.
-fn tell_emission<P: Profile>(
+fn tell_emission(
     scene: &Scene,
     surface: &Surface,
     origin: glam::Vec3,
@@ -142,7 +136,7 @@ fn tell_emission<P: Profile>(
 }
 
 /// Next-event estimation at vertex number `j`; also that of the bidirectional mappings.
-pub(super) fn tell_connection<P: Profile>(
+pub(super) fn tell_connection(
     scene: &Scene,
     surface: &Surface,
     carried: &Carried,

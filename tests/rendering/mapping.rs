@@ -3,12 +3,11 @@
 use relt::chain::Evaluator;
 use relt::embree::Width;
 use relt::path::{
-    Cause, Causes, Contribution, Elsewhere, Evaluation, Event, Faults, Mapping, MappingKind, Retraced, Workspace,
-    bidirectional, scalar,
+    Cause, Contribution, Evaluation, Event, Faults, Mapping, MappingKind, Narration, Retraced, Workspace,
 };
 use relt::rng::{Counter, Purpose, Rng};
 use relt::sample::{LIGHT_STREAM, Move, Points, Proposals, StepLaw};
-use relt::scene::{DiffuseProfile, FlatProfile, FullProfile, Kernel, PlainProfile, Profile, Scene};
+use relt::scene::{Kernel, Scene};
 
 use crate::support::{OWN, fixed_widths, load, own, repository};
 
@@ -60,27 +59,8 @@ fn told_sum_of(got: &Contribution, retraced: &Retraced) -> [f64; 3] {
     }
 }
 
-/// What the specification says of a lane.
-fn specified<P: Profile>(
-    mapping: &Mapping,
-    proposals: &mut Proposals,
-    lane: usize,
-) -> (Contribution, Elsewhere, Causes) {
-    if mapping.kind() == MappingKind::Unidirectional {
-        let (contribution, causes) = scalar::evaluate::<P>(mapping.scene(), mapping.layout(), proposals, lane);
-        return (contribution, Elsewhere::new(1), causes);
-    }
-    bidirectional::scalar::evaluate::<P>(mapping, proposals, lane)
-}
-
 /// All contributions and points that `STEPS` steps of the batch give, each compared with the scalar mapping.
-fn compare<P: Profile>(
-    name: &str,
-    scene: &Scene,
-    kind: MappingKind,
-    kernel: Kernel,
-    width: Width,
-) -> Vec<Contribution> {
+fn compare(name: &str, scene: &Scene, kind: MappingKind, kernel: Kernel, width: Width) -> Vec<Contribution> {
     let mapping = Mapping::with_kernel(scene, kind, fixed_widths(width), kernel);
     let rng = Rng::new(7);
     let mut evaluator = Evaluator::<Workspace>::new(rng, counters(0));
@@ -115,7 +95,7 @@ fn compare<P: Profile>(
         for lane in live.into_iter().map(|lane| lane as usize) {
             let replay =
                 format!("{name}, {} mapping, {kernel:?} kernel, width {width}, step {step}, lane {lane}", kind.name());
-            let (expected, elsewhere, causes) = specified::<P>(&mapping, &mut proposals, lane);
+            let (expected, elsewhere, causes) = mapping.walk(&mut proposals, (lane, false), &mut Narration::unheard());
             let got = evaluator.out.lanes[lane];
             assert_eq!(bits(&got), bits(&expected), "{replay}: {got:?} for {expected:?}");
             let got_elsewhere = evaluator.out.elsewhere.of(lane);
@@ -147,14 +127,14 @@ fn compare<P: Profile>(
     all
 }
 
-fn every_width<P: Profile>(name: &str, scene: &Scene, kernel: Kernel) -> Vec<Contribution> {
+fn every_width(name: &str, scene: &Scene, kernel: Kernel) -> Vec<Contribution> {
     for kind in MappingKind::ALL.into_iter().filter(|kind| *kind != MappingKind::Unidirectional) {
-        let points = compare::<P>(name, scene, kind, kernel, Width::W8);
+        let points = compare(name, scene, kind, kernel, Width::W8);
         let lit = points.iter().filter(|c| !c.is_dark()).count();
         assert!(lit >= 10, "{name}, {}: only {lit} of {} points are lit", kind.name(), points.len());
     }
     let uni = MappingKind::Unidirectional;
-    let mut of_widths = Width::ALL.map(|width| compare::<P>(name, scene, uni, kernel, width)).into_iter();
+    let mut of_widths = Width::ALL.map(|width| compare(name, scene, uni, kernel, width)).into_iter();
     let first = of_widths.next().expect("there are widths");
     for other in of_widths {
         assert!(first.iter().zip(&other).all(|(a, b)| bits(a) == bits(b)), "{name}: widths differ");
@@ -168,14 +148,14 @@ fn every_width<P: Profile>(name: &str, scene: &Scene, kernel: Kernel) -> Vec<Con
 fn every_lane_of_a_batch_is_what_the_scalar_mapping_says() {
     for name in OWN {
         let scene = own(name, &[("res", "64")]);
-        let full = every_width::<FullProfile>(name, &scene, Kernel::Full);
-        let plain = every_width::<PlainProfile>(name, &scene, Kernel::Plain);
-        let flat = every_width::<FlatProfile>(name, &scene, Kernel::Flat);
+        let full = every_width(name, &scene, Kernel::Full);
+        let plain = every_width(name, &scene, Kernel::Plain);
+        let flat = every_width(name, &scene, Kernel::Flat);
         for other in [&plain, &flat] {
             assert!(full.iter().zip(other).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
         }
         if scene.features.kernel() == Kernel::Diffuse {
-            let diffuse = every_width::<DiffuseProfile>(name, &scene, Kernel::Diffuse);
+            let diffuse = every_width(name, &scene, Kernel::Diffuse);
             assert!(full.iter().zip(&diffuse).all(|(a, b)| bits(a) == bits(b)), "{name}: kernels differ");
         }
     }
@@ -199,7 +179,7 @@ fn batch_and_scalar_agree_where_a_scene_has_everything() {
         "thin-lens",
     ] {
         let scene = load(&repository("tests/mitsuba").join(name).with_extension("xml"), &[]);
-        every_width::<FullProfile>(name, &scene, Kernel::Full);
+        every_width(name, &scene, Kernel::Full);
     }
 }
 

@@ -11,7 +11,7 @@
 mod connections;
 mod inversion;
 mod lengths;
-pub mod scalar;
+pub(super) mod scalar;
 mod side_by_side;
 mod subpath;
 mod techniques;

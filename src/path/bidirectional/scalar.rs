@@ -14,25 +14,20 @@ use crate::{
     },
     rng::unit_f32,
     sample::{Block, Proposals},
-    scene::{Mixture, NO_LIGHT, Profile, Rgb, Scattering, Scene, Surface},
+    scene::{FullProfile, Mixture, NO_LIGHT, Rgb, Scattering, Scene, Surface},
 };
 
-/// Evaluates the proposal of one lane: the contribution, what it gives to the film elsewhere, and why how many values had
-/// to be settled.
+/// Nothing is left out: what is said of one point holds for every kernel, and time is of no concern.
+type P = FullProfile;
+
+/// Evaluates the proposal of one lane and tells how: the contribution, what it gives to the film elsewhere, and why how many
+/// values had to be settled.
 ///
 /// f = Σ over the techniques (s, t) of the mapping of flux · scattering · geometry · scattering · throughput, each weighed
-/// by the power heuristic; for the multiplexed mapping one of them over the probability of its choice. Unbiased for the
-/// measurement of the film position that block 0 names once splats elsewhere are counted as well.
-pub fn evaluate<P: Profile>(
-    mapping: &Mapping,
-    proposals: &mut Proposals,
-    lane: usize,
-) -> (Contribution, Elsewhere, Causes) {
-    walk::<P>(mapping, proposals, (lane, false), &mut Narration::unheard())
-}
-
-/// The same, told to somebody on the way.
-pub(in crate::path) fn walk<P: Profile>(
+/// by the power heuristic; for the multiplexed mapping one of them over the probability of its choice, where the point does
+/// not leave it `open`. Unbiased for the measurement of the film position that block 0 names once splats elsewhere are
+/// counted as well.
+pub(in crate::path) fn walk(
     mapping: &Mapping,
     proposals: &mut Proposals,
     (lane, open): (usize, bool),
@@ -59,10 +54,10 @@ pub(in crate::path) fn walk<P: Profile>(
         narration,
     };
     if chosen.is_none_or(|chosen| chosen.light > 1) {
-        point.follow_light::<P>(unit_f32(choices[0]), &mut draw);
+        point.follow_light(unit_f32(choices[0]), &mut draw);
     }
     if mapping.kind().techniques().follow_camera() && chosen.is_none_or(|chosen| chosen.camera > 1) {
-        point.follow_camera::<P>(&mut draw);
+        point.follow_camera(&mut draw);
     }
     let Point { film, radiance, mut elsewhere, .. } = point;
     let (mut contribution, causes) = Contribution::settle_whole(film, radiance, &mut elsewhere, 0);
@@ -157,7 +152,7 @@ impl Point<'_, '_> {
         });
     }
 
-    fn follow_light<P: Profile>(&mut self, choice: f32, draw: &mut impl FnMut(u16) -> Block) {
+    fn follow_light(&mut self, choice: f32, draw: &mut impl FnMut(u16) -> Block) {
         let (layout, techniques) = (self.mapping.layout(), self.mapping.kind().techniques());
         let [a, b, c, d] = draw(layout.emission()).map(unit_f32);
         let Some(emission) = self.scene().emitters.emit::<P>([a, b], [c, d], choice) else { return };
@@ -218,7 +213,7 @@ impl Point<'_, '_> {
         }
     }
 
-    fn follow_camera<P: Profile>(&mut self, draw: &mut impl FnMut(u16) -> Block) {
+    fn follow_camera(&mut self, draw: &mut impl FnMut(u16) -> Block) {
         let (layout, techniques) = (self.mapping.layout(), self.mapping.kind().techniques());
         let scene = self.mapping.scene();
         let mut ray = scene.camera.ray(self.film, self.lens);
@@ -280,7 +275,7 @@ impl Point<'_, '_> {
                 }
             }
             for joined in connections {
-                self.connect::<P>(joined, &surface, &carried, &decisions, j);
+                self.connect(joined, &surface, &carried, &decisions, j);
             }
             if self.chosen.is_some() {
                 decisions.survive();
@@ -306,7 +301,7 @@ impl Point<'_, '_> {
     }
 
     /// Adds a connection to vertex number `j` of the camera's subpath.
-    fn connect<P: Profile>(
+    fn connect(
         &mut self,
         Joined { connection, scale, light_vertices }: Joined,
         surface: &Surface,
@@ -323,7 +318,7 @@ impl Point<'_, '_> {
         self.narration.tell(|| {
             if light_vertices == 1 {
                 let scaled = Connection { contribution, ..connection };
-                return tell_connection::<P>(scene, surface, carried, decisions, (&scaled, seen), sum, j);
+                return tell_connection(scene, surface, carried, decisions, (&scaled, seen), sum, j);
             }
             let flux = vertices[usize::from(light_vertices) - 2].arrival.flux;
             walk::found(Found {
