@@ -31,7 +31,7 @@ fn closed(shape: &str, albedo: f64, max_depth: i32, rr_depth: u32) -> String {
 fn methods() -> Vec<(&'static str, Settings)> {
     let of = |method| settings(method, 512.0, 0);
     let ladder = |k| Settings { ladder: LadderChoice::Replicas(k), ..of(Method::ReplicaExchange) };
-    vec![("path", of(Method::Path)), ("mlt", of(Method::Mlt)), ("re", of(Method::ReplicaExchange)), ("re-2", ladder(2))]
+    vec![("path", of(Method::Path)), ("re", of(Method::ReplicaExchange)), ("mlt", of(Method::Mlt)), ("re-2", ladder(2))]
 }
 
 /// All mappings with several ways to make a path, by path tracing, and the two with most by chains.
@@ -70,8 +70,10 @@ fn check_with(methods: &[(&str, Settings)], name: &str, scene: &str, radiance: f
 fn closed_rooms_that_glow_are_as_bright_as_their_series() {
     for shape in ["cube", "sphere"] {
         for albedo in [0.2, 0.5, 0.9] {
-            let radiance = 1.0 / (1.0 - albedo);
-            check(&format!("{shape}-{albedo}"), &closed(shape, albedo, -1, 5), radiance, 0.005);
+            let (name, scene) = (format!("{shape}-{albedo}"), closed(shape, albedo, -1, 5));
+            // What else there is tells no more of longer and shorter series, which take most of the time.
+            let methods = if albedo == 0.5 { methods() } else { methods()[..2].to_vec() };
+            check_with(&methods, &name, &scene, 1.0 / (1.0 - albedo), 0.005);
         }
     }
 }
