@@ -2,11 +2,15 @@
 
 use glam::Vec3;
 
+use super::vertex::Connection;
 use crate::{
+    embree::{Hits, Rays},
     math::{Frame, place_within, warp},
     scene::{
-        Scene,
+        Profile, Scene, Side,
         lights::{LightSample, on_face, towards_anyhow},
+        materials::{Diffuse, Material},
+        on_triangle,
     },
 };
 
@@ -28,6 +32,137 @@ impl Vectors {
     #[inline(always)]
     pub fn set(&mut self, j: usize, v: Vec3) {
         [self.0[0][j], self.0[1][j], self.0[2][j]] = v.to_array();
+    }
+}
+
+/// Where edges of paths end on flat meshes; truths are 0 or 1.
+pub(super) struct Ends {
+    pub direction: Vectors,
+    /// What was hit: corners and barycentric coordinates.
+    corners: [Vectors; 3],
+    u: [f32; N],
+    v: [f32; N],
+    /// Position and unit normal of the front, and whether it was hit from behind.
+    pub p: Vectors,
+    pub ng: Vectors,
+    back: [u32; N],
+    /// Number of the appearance, whether the normal is to be turned round, whether the material is diffuse.
+    pub appearance: [u32; N],
+    flip: [u32; N],
+    diffuse: [u32; N],
+    reflectance: Vectors,
+}
+
+impl Ends {
+    pub const NONE: Ends = Ends {
+        direction: Vectors::ZERO,
+        corners: [Vectors::ZERO; 3],
+        u: [0.0; N],
+        v: [0.0; N],
+        p: Vectors::ZERO,
+        ng: Vectors::ZERO,
+        back: [0; N],
+        appearance: [0; N],
+        flip: [0; N],
+        diffuse: [0; N],
+        reflectance: Vectors::ZERO,
+    };
+
+    /// Fetches what ray number `i` hit.
+    #[inline(always)]
+    pub fn fetch(&mut self, j: usize, scene: &Scene, rays: &Rays, hits: &Hits, i: usize) {
+        let [a, b, c] = scene.flat_corners(hits.geometry[i], hits.primitive[i]);
+        self.corners[0].set(j, a);
+        self.corners[1].set(j, b);
+        self.corners[2].set(j, c);
+        (self.u[j], self.v[j]) = (hits.u[i], hits.v[i]);
+        self.direction.set(j, rays.direction(i));
+    }
+
+    /// Finds where that is and which way it faces; the cosine between edge and normal of the front.
+    #[inline(always)]
+    pub fn meet(&mut self, j: usize) -> f32 {
+        let corners = [self.corners[0].get(j), self.corners[1].get(j), self.corners[2].get(j)];
+        let (p, ng) = on_triangle(corners, self.u[j], self.v[j]);
+        let cos = ng.dot(self.direction.get(j));
+        self.back[j] = u32::from(cos >= 0.0);
+        self.p.set(j, p);
+        self.ng.set(j, ng);
+        cos
+    }
+
+    /// Fetches what is on the side that was met.
+    #[inline(always)]
+    pub fn fetch_side<P: Profile>(&mut self, j: usize, scene: &Scene, hits: &Hits, i: usize) -> Side {
+        let (side, material) = scene.side(hits.geometry[i], self.back[j] == 1);
+        (self.appearance[j], self.flip[j]) = (side.appearance, u32::from(side.flip));
+        self.diffuse[j] = match material {
+            Material::Diffuse(diffuse) => {
+                self.reflectance.set(j, diffuse.reflectance);
+                1
+            }
+            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
+            _ => 0,
+        };
+        side
+    }
+
+    /// Whether the material is one that goes side by side.
+    #[inline(always)]
+    pub fn is_diffuse<P: Profile>(&self, j: usize) -> bool {
+        P::DIFFUSE || self.diffuse[j] == 1
+    }
+
+    #[inline(always)]
+    pub fn material(&self, j: usize) -> Diffuse {
+        Diffuse { reflectance: self.reflectance.get(j) }
+    }
+
+    /// The shading frame on the side that was met, and where the edge came from in it.
+    #[inline(always)]
+    pub fn seen(&self, j: usize) -> (Frame, Vec3) {
+        let ng = self.ng.get(j);
+        let frame = Frame::new(if self.flip[j] == 1 { -ng } else { ng });
+        (frame, frame.to_local(-self.direction.get(j)))
+    }
+}
+
+/// [`Connection`]s in step, and whether there are any.
+pub(super) struct Connections {
+    pub any: [u32; N],
+    origin: Vectors,
+    direction: Vectors,
+    end: [f32; N],
+    pub contribution: Vectors,
+}
+
+impl Connections {
+    pub const NONE: Connections = Connections {
+        any: [0; N],
+        origin: Vectors::ZERO,
+        direction: Vectors::ZERO,
+        end: [0.0; N],
+        contribution: Vectors::ZERO,
+    };
+
+    #[inline(always)]
+    pub fn set(&mut self, j: usize, connection: Connection, any: bool) {
+        let Connection { origin, direction, tfar, contribution } = connection;
+        self.any[j] = u32::from(any);
+        self.origin.set(j, origin);
+        self.direction.set(j, direction);
+        self.end[j] = tfar;
+        self.contribution.set(j, contribution);
+    }
+
+    #[inline(always)]
+    pub fn get(&self, j: usize) -> Connection {
+        Connection {
+            origin: self.origin.get(j),
+            direction: self.direction.get(j),
+            tfar: self.end[j],
+            contribution: self.contribution.get(j),
+        }
     }
 }
 
@@ -83,12 +218,4 @@ impl Aims {
         let probability = self.probability[j];
         (LightSample { weight: sample.weight / probability, pdf: sample.pdf * probability, ..sample }, shines)
     }
-}
-
-/// The shading frame of a flat surface with that normal, which is to be turned round or not, and where an edge in that
-/// direction came from in it.
-#[inline(always)]
-pub(super) fn frame_and_back(ng: Vec3, flip: u32, direction: Vec3) -> (Frame, Vec3) {
-    let frame = Frame::new(if flip == 1 { -ng } else { ng });
-    (frame, frame.to_local(-direction))
 }

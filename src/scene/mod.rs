@@ -25,7 +25,7 @@ pub use description::SceneDescription;
 pub use emitters::Emitters;
 pub use features::{DiffuseProfile, Features, FlatProfile, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
-pub(crate) use surface::on_triangle;
+pub(crate) use surface::{Side, on_triangle};
 pub use surface::{NO_LIGHT, Surface};
 
 use crate::embree;

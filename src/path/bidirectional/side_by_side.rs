@@ -8,7 +8,7 @@
 //! bits that it would have got alone; lanes without a subpath compute something that nobody looks at, and so do those on
 //! materials that are not diffuse, which then go through the vertex alone.
 
-use super::weights::Step;
+use super::weights::{Step, Tail};
 use crate::path::lanes::N;
 
 pub(super) mod camera;
@@ -33,5 +33,26 @@ impl Steps {
     #[inline(always)]
     fn set(&mut self, j: usize, step: Step) {
         Step { density: self.density[j], cos: self.cos[j], before: self.before[j], shorter: self.shorter[j] } = step;
+    }
+}
+
+/// [`Tail`]s in step.
+struct Tails {
+    inverse_density: [f64; N],
+    shorter: [f64; N],
+    earlier: [f64; N],
+}
+
+impl Tails {
+    const NONE: Tails = Tails { inverse_density: [0.0; N], shorter: [0.0; N], earlier: [0.0; N] };
+
+    #[inline(always)]
+    fn get(&self, j: usize) -> Tail {
+        Tail { inverse_density: self.inverse_density[j], shorter: self.shorter[j], earlier: self.earlier[j] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, j: usize, tail: Tail) {
+        Tail { inverse_density: self.inverse_density[j], shorter: self.shorter[j], earlier: self.earlier[j] } = tail;
     }
 }

@@ -8,54 +8,32 @@
 
 use std::marker::PhantomData;
 
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use pulp::NullaryFnOnce;
 
 use super::{Arrays, Connection, Edge, shade_one, vertex};
 use crate::{
-    math::Frame,
     path::{
         Mapping,
-        lanes::{Aims, N, Vectors, frame_and_back},
+        lanes::{Aims, Connections, Ends, N, Vectors},
         vertex::{Carried, Decisions, Roulette},
     },
     sample::Proposals,
-    scene::{
-        NO_LIGHT, Profile, Scene,
-        materials::{Diffuse, Material, Scatter},
-        on_triangle,
-    },
+    scene::{NO_LIGHT, Profile, Scene, materials::Scatter},
 };
 
 /// Vertices of a group of paths, as a structure of arrays; truths are 0 or 1.
 pub(super) struct Group {
     /// The edges that led there.
-    direction: Vectors,
+    ends: Ends,
     throughput: Vectors,
     survival: [f32; N],
-    /// What was hit: corners and barycentric coordinates.
-    corners: [Vectors; 3],
-    u: [f32; N],
-    v: [f32; N],
-    /// Position and unit normal of the front.
-    p: Vectors,
-    ng: Vectors,
-    /// Whether it was hit from behind, and whether its normal is to be turned round.
-    back: [u32; N],
-    flip: [u32; N],
-    /// Whether the material is diffuse.
-    diffuse: [u32; N],
-    reflectance: Vectors,
     /// Primary samples: direction, place on the light, roulette.
     chosen_direction: [[f32; N]; 2],
     aims: Aims,
     chosen_survival: [f32; N],
-    /// Connections to lights, and whether there are any.
-    connected: [u32; N],
-    shadow_origin: Vectors,
-    shadow_direction: Vectors,
-    shadow_end: [f32; N],
-    contribution: Vectors,
+    /// To lights.
+    connections: Connections,
     /// Next edges, and whether there are any.
     goes_on: [u32; N],
     next_origin: Vectors,
@@ -68,26 +46,13 @@ pub(super) struct Group {
 impl Default for Group {
     fn default() -> Group {
         Group {
-            direction: Vectors::ZERO,
+            ends: Ends::NONE,
             throughput: Vectors::ZERO,
             survival: [0.0; N],
-            corners: [Vectors::ZERO; 3],
-            u: [0.0; N],
-            v: [0.0; N],
-            p: Vectors::ZERO,
-            ng: Vectors::ZERO,
-            back: [0; N],
-            flip: [0; N],
-            diffuse: [0; N],
-            reflectance: Vectors::ZERO,
             chosen_direction: [[0.0; N]; 2],
             aims: Aims::NONE,
             chosen_survival: [0.0; N],
-            connected: [0; N],
-            shadow_origin: Vectors::ZERO,
-            shadow_direction: Vectors::ZERO,
-            shadow_end: [0.0; N],
-            contribution: Vectors::ZERO,
+            connections: Connections::NONE,
             goes_on: [0; N],
             next_origin: Vectors::ZERO,
             next_direction: Vectors::ZERO,
@@ -129,7 +94,9 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
         for (slots, lanes) in slots.chunks(N).zip(lanes.chunks(N)) {
             let g = &mut *group;
             fetch_hits(scene, w, slots, g);
-            meet(g);
+            for j in 0..N {
+                g.ends.meet(j);
+            }
             fetch_sides::<P>(scene, w, slots, lanes, g);
             fetch_choices(mapping, bounce, proposals, lanes, g);
             if lit {
@@ -141,12 +108,12 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
                 scatter::<false>(g)
             }
             for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
-                if !P::DIFFUSE && g.diffuse[j] == 0 {
+                if !g.ends.is_diffuse::<P>(j) {
                     kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
                     continue;
                 }
-                if lit && g.connected[j] == 1 {
-                    w.connect(lane, &g.connection(j));
+                if lit && g.connections.any[j] == 1 {
+                    w.connect(lane, &g.connections.get(j));
                 }
                 if g.goes_on[j] == 1 {
                     w.go_on(kept, lane, &g.edge(j));
@@ -164,25 +131,9 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
 fn fetch_hits(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
     for (j, &slot) in slots.iter().enumerate() {
         let i = slot as usize;
-        let [a, b, c] = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
-        g.corners[0].set(j, a);
-        g.corners[1].set(j, b);
-        g.corners[2].set(j, c);
-        (g.u[j], g.v[j]) = (w.hits.u[i], w.hits.v[i]);
-        g.direction.set(j, w.rays.direction(i));
+        g.ends.fetch(j, scene, &w.rays, &w.hits, i);
         g.throughput.set(j, w.carried[i].throughput);
         g.survival[j] = w.carried[i].survival;
-    }
-}
-
-/// Finds where that is and which way it faces.
-#[inline(always)]
-fn meet(g: &mut Group) {
-    for j in 0..N {
-        let (p, ng) = on_triangle([g.corners[0].get(j), g.corners[1].get(j), g.corners[2].get(j)], g.u[j], g.v[j]);
-        g.back[j] = u32::from(ng.dot(g.direction.get(j)) >= 0.0);
-        g.p.set(j, p);
-        g.ng.set(j, ng);
     }
 }
 
@@ -191,21 +142,9 @@ fn meet(g: &mut Group) {
 fn fetch_sides<P: Profile>(scene: &Scene, w: &mut Arrays, slots: &[u32], lanes: &[u32], g: &mut Group) {
     for (j, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
         let i = slot as usize;
-        let (side, material) = scene.side(w.hits.geometry[i], g.back[j] == 1);
-        g.flip[j] = u32::from(side.flip);
-        g.diffuse[j] = match material {
-            Material::Diffuse(diffuse) => {
-                g.reflectance.set(j, diffuse.reflectance);
-                1
-            }
-            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-            _ => {
-                g.diffuse[j] = 0;
-                continue;
-            }
-        };
-        if side.light != NO_LIGHT {
-            let place = ([g.p.get(j), g.ng.get(j)], Vec2::ZERO);
+        let side = g.ends.fetch_side::<P>(j, scene, &w.hits, i);
+        if side.light != NO_LIGHT && g.ends.is_diffuse::<P>(j) {
+            let place = ([g.ends.p.get(j), g.ends.ng.get(j)], Vec2::ZERO);
             w.radiance[lane as usize] +=
                 vertex::emitted::<P>(scene, side.light, place, w.rays.origin(i), &w.carried[i]);
         }
@@ -230,18 +169,13 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
 #[inline(always)]
 fn look_at_lights(g: &mut Group) {
     for j in 0..N {
-        let (light, shines) = g.aims.sample_anyhow(j, g.p.get(j), g.ng.get(j));
+        let (light, shines) = g.aims.sample_anyhow(j, g.ends.p.get(j), g.ends.ng.get(j));
         let connection = shines.then_some(light).and_then(|light| {
-            let (frame, wo) = g.seen(j);
-            let evaluation = Diffuse { reflectance: g.reflectance.get(j) }.evaluate(wo, frame.to_local(light.wi));
+            let (frame, wo) = g.ends.seen(j);
+            let evaluation = g.ends.material(j).evaluate(wo, frame.to_local(light.wi));
             vertex::connected(&light, evaluation, &g.carried(j))
         });
-        g.connected[j] = u32::from(connection.is_some());
-        let Connection { origin, direction, tfar, contribution } = connection.unwrap_or(Connection::NONE);
-        g.shadow_origin.set(j, origin);
-        g.shadow_direction.set(j, direction);
-        g.shadow_end[j] = tfar;
-        g.contribution.set(j, contribution);
+        g.connections.set(j, connection.unwrap_or(Connection::NONE), connection.is_some());
     }
 }
 
@@ -249,11 +183,11 @@ fn look_at_lights(g: &mut Group) {
 #[inline(always)]
 fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
-        let (frame, wo) = g.seen(j);
+        let (frame, wo) = g.ends.seen(j);
         let chosen = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
-        let (sample, above) = Diffuse { reflectance: g.reflectance.get(j) }.sample_anyhow(wo, chosen);
+        let (sample, above) = g.ends.material(j).sample_anyhow(wo, chosen);
         let u = ROULETTE.then_some(g.chosen_survival[j]);
-        let from = (g.p.get(j), g.ng.get(j), &frame);
+        let from = (g.ends.p.get(j), g.ends.ng.get(j), &frame);
         let (edge, goes_on) = vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex);
         g.goes_on[j] = u32::from(above & goes_on);
         let Edge { origin, direction, carried } = edge;
@@ -266,26 +200,10 @@ fn scatter<const ROULETTE: bool>(g: &mut Group) {
 }
 
 impl Group {
-    /// The frame on the side that is seen, and from where.
-    #[inline(always)]
-    fn seen(&self, j: usize) -> (Frame, Vec3) {
-        frame_and_back(self.ng.get(j), self.flip[j], self.direction.get(j))
-    }
-
     /// What a path carried along the edge that led to its vertex, but for the density, which only emission needs.
     #[inline(always)]
     fn carried(&self, j: usize) -> Carried {
         Carried { throughput: self.throughput.get(j), survival: self.survival[j], ..Carried::START }
-    }
-
-    #[inline(always)]
-    fn connection(&self, j: usize) -> Connection {
-        Connection {
-            origin: self.shadow_origin.get(j),
-            direction: self.shadow_direction.get(j),
-            tfar: self.shadow_end[j],
-            contribution: self.contribution.get(j),
-        }
     }
 
     /// Diffuse surfaces refract nothing, so the product of ratios of refractive indices stays 1.

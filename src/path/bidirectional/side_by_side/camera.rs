@@ -1,76 +1,54 @@
 //! Vertices of camera subpaths.
 
-use glam::Vec3;
 use pulp::NullaryFnOnce;
 
 use super::{
     super::{
-        Arrays, CameraEnd, Connection, ONE, Site, add_connection, collect_hit, connections, join, scatter_camera_one,
-        subpath,
-        weights::{self, Tail},
+        Arrays, CameraEnd, ONE, Site, add_connection, collect_hit, connections, join, scatter_camera_one, subpath,
+        weights,
     },
-    Steps,
+    Steps, Tails,
 };
 use crate::{
-    math::{Frame, widest},
+    math::widest,
     path::{
         Contributions, Mapping,
-        lanes::{Aims, N, Vectors, frame_and_back},
+        lanes::{Aims, Connections, Ends, N, Vectors},
         vertex::{self, Carried, Decisions, Edge, Roulette},
     },
     sample::Proposals,
     scene::{
         Camera, Eye, NO_LIGHT, Profile, ScatteringRef, Scene,
         lights::{SHORT_OF_LIGHT, surface_direction_pdf},
-        materials::{Diffuse, Evaluation, Material, Scatter},
-        on_triangle,
+        materials::{Evaluation, Scatter},
     },
 };
 
 /// Vertices of a group of camera subpaths, as a structure of arrays; truths are 0 or 1.
 pub struct Group {
-    /// The edges that led there: start, direction, and what they carry.
+    /// The edges that led there: where they start, what they carry, and where they end.
     from: Vectors,
-    direction: Vectors,
     throughput: Vectors,
     pdf: [f32; N],
     eta: [f32; N],
     survival: [f32; N],
     step: Steps,
-    /// What was hit: corners and barycentric coordinates.
-    corners: [Vectors; 3],
-    u: [f32; N],
-    v: [f32; N],
-    /// Position and unit normal of the front, and whether it was hit from behind.
-    p: Vectors,
-    ng: Vectors,
-    back: [u32; N],
+    ends: Ends,
     /// What the tail follows from: place on the lens and density of the camera's rays there for first vertices, square of the
     /// distance for others, and |cos|.
     lens: [[f32; N]; 2],
     seen: [f32; N],
     distance2: [f32; N],
     cos: [f32; N],
-    inverse_density: [f64; N],
-    shorter: [f64; N],
-    earlier: [f64; N],
-    /// Number of the appearance, whether the normal is to be turned round, whether the material is diffuse, and whether the
-    /// surface is a light.
-    appearance: [u32; N],
-    flip: [u32; N],
-    diffuse: [u32; N],
+    tail: Tails,
+    /// Whether the surface is a light.
     shines: [u32; N],
-    reflectance: Vectors,
     /// Primary samples: direction, place on the light, roulette.
     chosen_direction: [[f32; N]; 2],
     aims: Aims,
     chosen_survival: [f32; N],
-    /// Connections to lights, and whether there are any.
-    connected: [u32; N],
-    shadow_origin: Vectors,
-    shadow_direction: Vectors,
-    shadow_end: [f32; N],
-    contribution: Vectors,
+    /// To lights.
+    connections: Connections,
     /// How dense scattering makes them over how dense they are; and the density of the vertex from the light's side, per area,
     /// and that of the direction back to the one before.
     ratio: [f32; N],
@@ -93,39 +71,23 @@ pub struct Group {
 impl Default for Group {
     fn default() -> Group {
         Group {
+            ends: Ends::NONE,
             from: Vectors::ZERO,
-            direction: Vectors::ZERO,
             throughput: Vectors::ZERO,
             pdf: [1.0; N],
             eta: [1.0; N],
             survival: [1.0; N],
             step: Steps::NOWHERE,
-            corners: [Vectors::ZERO; 3],
-            u: [0.0; N],
-            v: [0.0; N],
-            p: Vectors::ZERO,
-            ng: Vectors::ZERO,
-            back: [0; N],
             lens: [[0.0; N]; 2],
             seen: [0.0; N],
             distance2: [0.0; N],
             cos: [0.0; N],
-            inverse_density: [0.0; N],
-            shorter: [0.0; N],
-            earlier: [0.0; N],
-            appearance: [0; N],
-            flip: [0; N],
-            diffuse: [0; N],
+            tail: Tails::NONE,
             shines: [0; N],
-            reflectance: Vectors::ZERO,
             chosen_direction: [[0.0; N]; 2],
             aims: Aims::NONE,
             chosen_survival: [0.0; N],
-            connected: [0; N],
-            shadow_origin: Vectors::ZERO,
-            shadow_direction: Vectors::ZERO,
-            shadow_end: [0.0; N],
-            contribution: Vectors::ZERO,
+            connections: Connections::NONE,
             ratio: [0.0; N],
             light_density: [0.0; N],
             back_pdf: [0.0; N],
@@ -166,19 +128,22 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
         let g = &mut *group;
         fetch_hits(scene, w, j, [slots, lanes], g);
         widest(Meet { g, camera: &scene.camera, first: j == 1 });
-        fetch_sides::<P>(scene, w, slots, g);
+        for (k, &slot) in slots.iter().enumerate() {
+            let side = g.ends.fetch_side::<P>(k, scene, &w.hits, slot as usize);
+            g.shines[k] = u32::from(side.light != NO_LIGHT);
+        }
         if goes_on {
             let looks = fetch_choices::<HOW>(mapping, j, w, proposals, lanes, lit, g);
             let scatters = HOW != ONE || lanes.iter().any(|lane| w.chosen[*lane as usize].camera != j + 1);
             widest(Leave { g, looks, scatters, roulette, compared });
         }
         for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
-            if !P::DIFFUSE && g.diffuse[k] == 0 {
+            if !g.ends.is_diffuse::<P>(k) {
                 kept = scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, [slot, lane], kept);
                 continue;
             }
             if g.shines[k] == 1 {
-                let (i, tail) = (slot as usize, g.tail(k));
+                let (i, tail) = (slot as usize, g.tail.get(k));
                 let hit = w.hits.get(i).expect("misses are gone");
                 let surface = scene.surface::<P>(hit, w.rays.origin(i), w.rays.direction(i));
                 let end = CameraEnd { carried: w.carried[i], tail };
@@ -188,11 +153,11 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
                 continue;
             }
             let chosen = (HOW == ONE).then(|| w.chosen[lane as usize]);
-            if lit && g.connected[k] == 1 && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
-                add_connection::<HOW>(mapping, w, lane, g.connection(k), [1, j + 1], g.survival[k]);
+            if lit && g.connections.any[k] == 1 && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
+                add_connection::<HOW>(mapping, w, lane, g.connections.get(k), [1, j + 1], g.survival[k]);
             }
             if techniques.inner {
-                let end = CameraEnd { carried: g.carried(k), tail: g.tail(k) };
+                let end = CameraEnd { carried: g.carried(k), tail: g.tail.get(k) };
                 join::<P, HOW>(mapping, j, proposals, w, lane, &end, &g.site(k, scene));
             }
             if g.goes_on[k] == 1 && chosen.is_none_or(|chosen| chosen.camera != j + 1) {
@@ -210,13 +175,8 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
 fn fetch_hits(scene: &Scene, w: &Arrays, j: u16, [slots, lanes]: [&[u32]; 2], g: &mut Group) {
     for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
         let i = slot as usize;
-        let [a, b, c] = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
-        g.corners[0].set(k, a);
-        g.corners[1].set(k, b);
-        g.corners[2].set(k, c);
-        (g.u[k], g.v[k]) = (w.hits.u[i], w.hits.v[i]);
+        g.ends.fetch(k, scene, &w.rays, &w.hits, i);
         g.from.set(k, w.rays.origin(i));
-        g.direction.set(k, w.rays.direction(i));
         let carried = &w.carried[i];
         g.throughput.set(k, carried.throughput);
         (g.pdf[k], g.eta[k], g.survival[k]) = (carried.pdf, carried.eta, carried.survival);
@@ -242,18 +202,12 @@ impl NullaryFnOnce for Meet<'_> {
     fn call(self) {
         let Meet { g, camera, first } = self;
         for j in 0..N {
-            let (p, ng) = on_triangle([g.corners[0].get(j), g.corners[1].get(j), g.corners[2].get(j)], g.u[j], g.v[j]);
-            let cos = ng.dot(g.direction.get(j));
-            g.back[j] = u32::from(cos >= 0.0);
-            g.p.set(j, p);
-            g.ng.set(j, ng);
-            g.distance2[j] = (p - g.from.get(j)).length_squared();
-            g.cos[j] = cos.abs();
+            g.cos[j] = g.ends.meet(j).abs();
+            g.distance2[j] = (g.ends.p.get(j) - g.from.get(j)).length_squared();
         }
         if !first {
             for j in 0..N {
-                let tail = g.step.get(j).arrive(g.distance2[j], g.cos[j]);
-                Tail { inverse_density: g.inverse_density[j], shorter: g.shorter[j], earlier: g.earlier[j] } = tail;
+                g.tail.set(j, g.step.get(j).arrive(g.distance2[j], g.cos[j]));
             }
             return;
         }
@@ -263,8 +217,7 @@ impl NullaryFnOnce for Meet<'_> {
             eye => see(&camera, eye, g),
         }
         for j in 0..N {
-            let tail = subpath::seen_with(g.seen[j], g.cos[j]);
-            Tail { inverse_density: g.inverse_density[j], shorter: g.shorter[j], earlier: g.earlier[j] } = tail;
+            g.tail.set(j, subpath::seen_with(g.seen[j], g.cos[j]));
         }
     }
 }
@@ -273,25 +226,7 @@ impl NullaryFnOnce for Meet<'_> {
 #[inline(always)]
 fn see(camera: &Camera, eye: Eye, g: &mut Group) {
     for j in 0..N {
-        g.seen[j] = camera.density_from(eye, g.p.get(j), [g.lens[0][j], g.lens[1][j]]);
-    }
-}
-
-/// Fetches the materials.
-#[inline(always)]
-fn fetch_sides<P: Profile>(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
-    for (k, &slot) in slots.iter().enumerate() {
-        let (side, material) = scene.side(w.hits.geometry[slot as usize], g.back[k] == 1);
-        (g.appearance[k], g.flip[k]) = (side.appearance, u32::from(side.flip));
-        g.shines[k] = u32::from(side.light != NO_LIGHT);
-        g.diffuse[k] = match material {
-            Material::Diffuse(diffuse) => {
-                g.reflectance.set(k, diffuse.reflectance);
-                1
-            }
-            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-            _ => 0,
-        };
+        g.seen[j] = camera.density_from(eye, g.ends.p.get(j), [g.lens[0][j], g.lens[1][j]]);
     }
 }
 
@@ -355,7 +290,7 @@ impl NullaryFnOnce for Leave<'_> {
         }
         for j in 0..N {
             let densities = Some([g.next_pdf[0][j], g.next_pdf[1][j]]);
-            let step = g.tail(j).leave(densities, g.next_cos[j], compared);
+            let step = g.tail.get(j).leave(densities, g.next_cos[j], compared);
             g.next_step.set(j, step);
         }
     }
@@ -365,20 +300,15 @@ impl NullaryFnOnce for Leave<'_> {
 #[inline(always)]
 fn look_at_lights(g: &mut Group) {
     for j in 0..N {
-        let (p, ng) = (g.p.get(j), g.ng.get(j));
-        let (frame, wo) = g.towards_eye(j);
-        let material = Diffuse { reflectance: g.reflectance.get(j) };
+        let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
+        let (frame, wo) = g.ends.seen(j);
+        let material = g.ends.material(j);
         let (light, shines) = g.aims.sample_anyhow(j, p, ng);
         let wi = frame.to_local(light.wi);
         let Evaluation { value, pdf } = material.evaluate(wo, wi);
         let (connection, lit) = connections::looked_at(&light, g.throughput.get(j) * value);
-        g.connected[j] = u32::from(shines & lit);
-        let Connection { origin, direction, tfar, contribution } = connection;
-        g.shadow_origin.set(j, origin);
-        g.shadow_direction.set(j, direction);
-        g.shadow_end[j] = tfar;
-        g.contribution.set(j, contribution);
-        let distance = tfar / SHORT_OF_LIGHT;
+        g.connections.set(j, connection, shines & lit);
+        let distance = connection.tfar / SHORT_OF_LIGHT;
         let rest = surface_direction_pdf(light.normals, -light.wi);
         g.ratio[j] = pdf / light.pdf;
         g.light_density[j] = rest * ng.dot(light.wi).abs() / (distance * distance);
@@ -390,13 +320,13 @@ fn look_at_lights(g: &mut Group) {
 #[inline(always)]
 fn weigh(compared: bool, g: &mut Group) {
     for j in 0..N {
-        let (tail, ratio) = (g.tail(j), f64::from(g.ratio[j]));
+        let (tail, ratio) = (g.tail.get(j), f64::from(g.ratio[j]));
         let back = if tail.earlier > 0.0 { f64::from(g.back_pdf[j]) } else { 0.0 };
         let others = ratio * ratio + tail.others(f64::from(g.light_density[j]), back, compared);
         g.weight[j] = weights::weight(others);
     }
     for j in 0..N {
-        g.contribution.set(j, g.contribution.get(j) * g.weight[j]);
+        g.connections.contribution.set(j, g.connections.contribution.get(j) * g.weight[j]);
     }
 }
 
@@ -404,9 +334,9 @@ fn weigh(compared: bool, g: &mut Group) {
 #[inline(always)]
 fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
-        let (frame, wo) = g.towards_eye(j);
-        let (p, ng) = (g.p.get(j), g.ng.get(j));
-        let material = Diffuse { reflectance: g.reflectance.get(j) };
+        let (frame, wo) = g.ends.seen(j);
+        let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
+        let material = g.ends.material(j);
         let (sample, above) = material.sample_anyhow(wo, [g.chosen_direction[0][j], g.chosen_direction[1][j]]);
         let u = ROULETTE.then_some(g.chosen_survival[j]);
         let (edge, goes_on) = vertex::scattered((p, ng, &frame), sample, &g.carried(j), u, Roulette::Path);
@@ -423,36 +353,15 @@ fn scatter<const ROULETTE: bool>(g: &mut Group) {
 }
 
 impl Group {
-    /// The frame on the side that is seen, and from where.
-    #[inline(always)]
-    fn towards_eye(&self, j: usize) -> (Frame, Vec3) {
-        frame_and_back(self.ng.get(j), self.flip[j], self.direction.get(j))
-    }
-
-    #[inline(always)]
-    fn tail(&self, j: usize) -> Tail {
-        Tail { inverse_density: self.inverse_density[j], shorter: self.shorter[j], earlier: self.earlier[j] }
-    }
-
     #[inline(always)]
     fn carried(&self, j: usize) -> Carried {
         Carried { throughput: self.throughput.get(j), pdf: self.pdf[j], eta: self.eta[j], survival: self.survival[j] }
     }
 
     #[inline(always)]
-    fn connection(&self, j: usize) -> Connection {
-        Connection {
-            origin: self.shadow_origin.get(j),
-            direction: self.shadow_direction.get(j),
-            tfar: self.shadow_end[j],
-            contribution: self.contribution.get(j),
-        }
-    }
-
-    #[inline(always)]
     fn site<'s>(&self, j: usize, scene: &'s Scene) -> Site<'s> {
-        let ((p, ng), (frame, wo)) = ((self.p.get(j), self.ng.get(j)), self.towards_eye(j));
-        Site { p, ng, lift: ng, frame, wo, scattering: ScatteringRef::Plain(scene.material(self.appearance[j])) }
+        let ((p, ng), (frame, wo)) = ((self.ends.p.get(j), self.ends.ng.get(j)), self.ends.seen(j));
+        Site { p, ng, lift: ng, frame, wo, scattering: ScatteringRef::Plain(scene.material(self.ends.appearance[j])) }
     }
 
     #[inline(always)]

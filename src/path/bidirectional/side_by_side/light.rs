@@ -5,67 +5,46 @@ use pulp::NullaryFnOnce;
 
 use super::{
     super::{
-        Arrays, Connection, LightVertex, ONE, Seen, add_splat, connections, is_last, keep_vertex, scatter_light_one,
-        subpath,
+        Arrays, LightVertex, ONE, Seen, add_splat, connections, is_last, keep_vertex, scatter_light_one, subpath,
         subpath::{Arrival, LightEdge, Particle},
-        weights::{self, Tail},
+        weights,
     },
-    Steps,
+    Steps, Tails,
 };
 use crate::{
-    math::{Frame, offset_origin, widest},
+    math::{offset_origin, widest},
     path::{
         Mapping,
-        lanes::{N, Vectors, frame_and_back},
+        lanes::{Connections, Ends, N, Vectors},
         vertex::Decisions,
     },
     sample::Proposals,
     scene::{
-        Camera, Eye, Profile, Scene, Sight,
-        materials::{Diffuse, Evaluation, Material, Scatter},
-        on_triangle,
+        Camera, Eye, Profile, Sight,
+        materials::{Evaluation, Scatter},
     },
 };
 
 /// Vertices of a group of light subpaths, as a structure of arrays; truths are 0 or 1.
 pub struct Group {
-    /// The edges that led there: where densities take them to start, direction, and what they carry.
+    /// The edges that led there: where densities take them to start, what they carry, and where they end.
     from: Vectors,
-    direction: Vectors,
     flux: Vectors,
     survival: [f32; N],
     step: Steps,
-    /// What was hit: corners and barycentric coordinates.
-    corners: [Vectors; 3],
-    u: [f32; N],
-    v: [f32; N],
-    /// Position and unit normal of the front, and whether it was hit from behind.
-    p: Vectors,
-    ng: Vectors,
-    back: [u32; N],
+    ends: Ends,
     /// The arrival there, and what its tail follows from: square of the distance, |cos|.
     arrived: Vectors,
     distance2: [f32; N],
     cos: [f32; N],
-    inverse_density: [f64; N],
-    shorter: [f64; N],
-    earlier: [f64; N],
-    /// Number of the appearance, whether the normal is to be turned round, whether the material is diffuse.
-    appearance: [u32; N],
-    flip: [u32; N],
-    diffuse: [u32; N],
-    reflectance: Vectors,
+    tail: Tails,
     /// Place on the lens, and primary samples: direction and roulette.
     lens: [[f32; N]; 2],
     chosen_direction: [[f32; N]; 2],
     chosen_survival: [f32; N],
-    /// Connections to the camera, and whether there are any.
-    seen: [u32; N],
+    /// To the camera, and where that is on the film.
+    connections: Connections,
     film: [[f32; N]; 2],
-    shadow_origin: Vectors,
-    shadow_direction: Vectors,
-    shadow_end: [f32; N],
-    contribution: Vectors,
     /// Densities with which they are made from the camera: of the place per area, and of the direction back to the light.
     camera_density: [f32; N],
     back_pdf: [f32; N],
@@ -85,36 +64,20 @@ pub struct Group {
 impl Default for Group {
     fn default() -> Group {
         Group {
+            ends: Ends::NONE,
             from: Vectors::ZERO,
-            direction: Vectors::ZERO,
             flux: Vectors::ZERO,
             survival: [1.0; N],
             step: Steps::NOWHERE,
-            corners: [Vectors::ZERO; 3],
-            u: [0.0; N],
-            v: [0.0; N],
-            p: Vectors::ZERO,
-            ng: Vectors::ZERO,
-            back: [0; N],
             arrived: Vectors::ZERO,
             distance2: [0.0; N],
             cos: [0.0; N],
-            inverse_density: [0.0; N],
-            shorter: [0.0; N],
-            earlier: [0.0; N],
-            appearance: [0; N],
-            flip: [0; N],
-            diffuse: [0; N],
-            reflectance: Vectors::ZERO,
+            tail: Tails::NONE,
             lens: [[0.0; N]; 2],
             chosen_direction: [[0.0; N]; 2],
             chosen_survival: [0.0; N],
-            seen: [0; N],
+            connections: Connections::NONE,
             film: [[0.0; N]; 2],
-            shadow_origin: Vectors::ZERO,
-            shadow_direction: Vectors::ZERO,
-            shadow_end: [0.0; N],
-            contribution: Vectors::ZERO,
             camera_density: [0.0; N],
             back_pdf: [0.0; N],
             weight: [0.0; N],
@@ -151,19 +114,21 @@ pub fn scatter_light<P: Profile, const HOW: u8>(
         let g = &mut *group;
         fetch_hits(mapping, w, j, slots, g);
         widest(Meet { g, weighs });
-        fetch_sides::<P>(scene, w, slots, g);
+        for (k, &slot) in slots.iter().enumerate() {
+            g.ends.fetch_side::<P>(k, scene, &w.hits, slot as usize);
+        }
         fetch_choices(mapping, j, w, proposals, lanes, g);
         let last = |lane: &&u32| is_last::<HOW>(w, **lane, j);
         let looks = HOW != ONE || lanes.iter().filter(last).any(|lane| w.chosen[*lane as usize].camera == 1);
         let goes_on = goes_on && !lanes.iter().all(|lane| is_last::<HOW>(w, *lane, j));
         widest(Leave { g, camera: &scene.camera, looks, weighed, roulette, goes_on });
         for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
-            if !P::DIFFUSE && g.diffuse[k] == 0 {
+            if !g.ends.is_diffuse::<P>(k) {
                 kept = scatter_light_one::<P, HOW>(mapping, j, proposals, w, [slot, lane], kept);
                 continue;
             }
             let last = is_last::<HOW>(w, lane, j);
-            if g.seen[k] == 1 && (HOW != ONE || last && w.chosen[lane as usize].camera == 1) {
+            if g.connections.any[k] == 1 && (HOW != ONE || last && w.chosen[lane as usize].camera == 1) {
                 add_splat::<HOW>(mapping, j, w, lane, g.splat(k), g.survival[k]);
             }
             if techniques.inner && (HOW != ONE || last && w.chosen[lane as usize].camera > 1) {
@@ -186,12 +151,7 @@ fn fetch_hits(mapping: &Mapping, w: &Arrays, j: u16, slots: &[u32], g: &mut Grou
     let weighs = techniques.weigh();
     for (k, &slot) in slots.iter().enumerate() {
         let i = slot as usize;
-        let [a, b, c] = scene.flat_corners(w.hits.geometry[i], w.hits.primitive[i]);
-        g.corners[0].set(k, a);
-        g.corners[1].set(k, b);
-        g.corners[2].set(k, c);
-        (g.u[k], g.v[k]) = (w.hits.u[i], w.hits.v[i]);
-        g.direction.set(k, w.rays.direction(i));
+        g.ends.fetch(k, scene, &w.rays, &w.hits, i);
         g.flux.set(k, w.particles[i].flux);
         g.survival[k] = w.particles[i].survival;
         if weighs {
@@ -219,39 +179,17 @@ impl NullaryFnOnce for Meet<'_> {
     fn call(self) {
         let Meet { g, weighs } = self;
         for j in 0..N {
-            let (p, ng) = on_triangle([g.corners[0].get(j), g.corners[1].get(j), g.corners[2].get(j)], g.u[j], g.v[j]);
-            let cos = ng.dot(g.direction.get(j));
+            let cos = g.ends.meet(j).abs();
             let particle = Particle { flux: g.flux.get(j), survival: g.survival[j] };
-            g.back[j] = u32::from(cos >= 0.0);
-            g.p.set(j, p);
-            g.ng.set(j, ng);
-            g.arrived.set(j, particle.arrive(cos.abs(), subpath::STRAIGHT_OUT).flux);
-            g.distance2[j] = (p - g.from.get(j)).length_squared();
-            g.cos[j] = cos.abs();
+            g.arrived.set(j, particle.arrive(cos, subpath::STRAIGHT_OUT).flux);
+            g.distance2[j] = (g.ends.p.get(j) - g.from.get(j)).length_squared();
+            g.cos[j] = cos;
         }
         if weighs {
             for j in 0..N {
-                let tail = g.step.get(j).arrive(g.distance2[j], g.cos[j]);
-                Tail { inverse_density: g.inverse_density[j], shorter: g.shorter[j], earlier: g.earlier[j] } = tail;
+                g.tail.set(j, g.step.get(j).arrive(g.distance2[j], g.cos[j]));
             }
         }
-    }
-}
-
-/// Fetches the materials.
-#[inline(always)]
-fn fetch_sides<P: Profile>(scene: &Scene, w: &Arrays, slots: &[u32], g: &mut Group) {
-    for (k, &slot) in slots.iter().enumerate() {
-        let (side, material) = scene.side(w.hits.geometry[slot as usize], g.back[k] == 1);
-        (g.appearance[k], g.flip[k]) = (side.appearance, u32::from(side.flip));
-        g.diffuse[k] = match material {
-            Material::Diffuse(diffuse) => {
-                g.reflectance.set(k, diffuse.reflectance);
-                1
-            }
-            _ if P::DIFFUSE => unreachable!("a profile with diffuse materials only"),
-            _ => 0,
-        };
     }
 }
 
@@ -312,21 +250,16 @@ impl NullaryFnOnce for Leave<'_> {
 #[inline(always)]
 fn look(camera: &Camera, eye: Eye, g: &mut Group) {
     for j in 0..N {
-        let (sight, visible) = camera.sight_anyhow(eye, g.p.get(j), [g.lens[0][j], g.lens[1][j]]);
-        let (frame, wo) = g.towards_light(j);
+        let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
+        let (sight, visible) = camera.sight_anyhow(eye, p, [g.lens[0][j], g.lens[1][j]]);
+        let (frame, wo) = g.ends.seen(j);
         let Sight { direction, density, .. } = sight;
-        let material = Diffuse { reflectance: g.reflectance.get(j) };
-        let Evaluation { value, pdf } = material.evaluate(frame.to_local(direction), wo);
-        let density = density * g.ng.get(j).dot(direction).abs();
-        let origin = start_towards(g.p.get(j), g.ng.get(j), direction);
+        let Evaluation { value, pdf } = g.ends.material(j).evaluate(frame.to_local(direction), wo);
+        let density = density * ng.dot(direction).abs();
+        let origin = start_towards(p, ng, direction);
         let (seen, lit) = connections::seen_at(&sight, origin, g.arrived.get(j) * value * density);
-        g.seen[j] = u32::from(visible & lit);
+        g.connections.set(j, seen.connection, visible & lit);
         [g.film[0][j], g.film[1][j]] = seen.film;
-        let Connection { origin, direction, tfar, contribution } = seen.connection;
-        g.shadow_origin.set(j, origin);
-        g.shadow_direction.set(j, direction);
-        g.shadow_end[j] = tfar;
-        g.contribution.set(j, contribution);
         (g.camera_density[j], g.back_pdf[j]) = (density, pdf);
     }
 }
@@ -335,11 +268,11 @@ fn look(camera: &Camera, eye: Eye, g: &mut Group) {
 #[inline(always)]
 fn weigh(compared: bool, g: &mut Group) {
     for j in 0..N {
-        let others = g.tail(j).others(f64::from(g.camera_density[j]), f64::from(g.back_pdf[j]), compared);
+        let others = g.tail.get(j).others(f64::from(g.camera_density[j]), f64::from(g.back_pdf[j]), compared);
         g.weight[j] = weights::weight(others);
     }
     for j in 0..N {
-        g.contribution.set(j, g.contribution.get(j) * g.weight[j]);
+        g.connections.contribution.set(j, g.connections.contribution.get(j) * g.weight[j]);
     }
 }
 
@@ -347,18 +280,18 @@ fn weigh(compared: bool, g: &mut Group) {
 #[inline(always)]
 fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
-        let (frame, wo) = g.towards_light(j);
-        let material = Diffuse { reflectance: g.reflectance.get(j) };
+        let (frame, wo) = g.ends.seen(j);
+        let material = g.ends.material(j);
         let (sample, above) = material.sample_anyhow(wo, [g.chosen_direction[0][j], g.chosen_direction[1][j]]);
         let there = material.evaluate(sample.wi, wo);
         let (direction, back) = (frame.to_world(sample.wi), frame.to_world(wo));
-        let ng = g.ng.get(j);
+        let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
         let (cos_before, cos) = (ng.dot(back).abs(), ng.dot(direction).abs());
         let arrival = Arrival { flux: g.arrived.get(j), tail: subpath::STRAIGHT_OUT, survival: g.survival[j] };
         let u = ROULETTE.then_some(g.chosen_survival[j]);
         let (particle, goes_on) = arrival.scattered(there.value / sample.pdf, [cos_before, cos], u);
         g.goes_on[j] = u32::from(above & goes_on);
-        g.next_origin.set(j, start_towards(g.p.get(j), ng, direction));
+        g.next_origin.set(j, start_towards(p, ng, direction));
         g.next_direction.set(j, direction);
         g.next_flux.set(j, particle.flux);
         g.next_survival[j] = particle.survival;
@@ -372,7 +305,7 @@ fn scatter<const ROULETTE: bool>(g: &mut Group) {
 fn step(compared: bool, g: &mut Group) {
     for j in 0..N {
         let densities = Some([g.next_pdf[0][j], g.next_pdf[1][j]]);
-        let step = g.tail(j).leave(densities, g.next_cos[j], compared);
+        let step = g.tail.get(j).leave(densities, g.next_cos[j], compared);
         g.next_step.set(j, step);
     }
 }
@@ -384,34 +317,15 @@ fn start_towards(p: Vec3, ng: Vec3, direction: Vec3) -> Vec3 {
 }
 
 impl Group {
-    /// The frame on the side that light came from, and from where.
-    #[inline(always)]
-    fn towards_light(&self, j: usize) -> (Frame, Vec3) {
-        frame_and_back(self.ng.get(j), self.flip[j], self.direction.get(j))
-    }
-
-    #[inline(always)]
-    fn tail(&self, j: usize) -> Tail {
-        Tail { inverse_density: self.inverse_density[j], shorter: self.shorter[j], earlier: self.earlier[j] }
-    }
-
     #[inline(always)]
     fn splat(&self, j: usize) -> Seen {
-        Seen {
-            film: [self.film[0][j], self.film[1][j]],
-            connection: Connection {
-                origin: self.shadow_origin.get(j),
-                direction: self.shadow_direction.get(j),
-                tfar: self.shadow_end[j],
-                contribution: self.contribution.get(j),
-            },
-        }
+        Seen { film: [self.film[0][j], self.film[1][j]], connection: self.connections.get(j) }
     }
 
     fn vertex(&self, j: usize) -> LightVertex {
-        let (frame, wo) = self.towards_light(j);
-        let arrival = Arrival { flux: self.arrived.get(j), tail: self.tail(j), survival: self.survival[j] };
-        LightVertex::flat([self.p.get(j), self.ng.get(j)], frame, wo, self.appearance[j], arrival)
+        let (frame, wo) = self.ends.seen(j);
+        let arrival = Arrival { flux: self.arrived.get(j), tail: self.tail.get(j), survival: self.survival[j] };
+        LightVertex::flat([self.ends.p.get(j), self.ends.ng.get(j)], frame, wo, self.ends.appearance[j], arrival)
     }
 
     #[inline(always)]
