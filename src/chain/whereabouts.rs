@@ -52,11 +52,11 @@ impl Whereabouts {
         self.squares += (weight as f64 * shares.iter().map(|share| share * share).sum::<f64>()) as u64;
     }
 
-    /// Adds the states of others.
+    /// Adds the states of others, which may come from a file and be of any size.
     pub fn merge(&mut self, other: &Whereabouts) {
-        self.cells.iter_mut().zip(other.cells).for_each(|(sum, cell)| *sum += cell);
-        self.squares += other.squares;
-        self.states += other.states;
+        self.cells.iter_mut().zip(other.cells).for_each(|(sum, cell)| *sum = sum.saturating_add(cell));
+        self.squares = self.squares.saturating_add(other.squares);
+        self.states = self.states.saturating_add(other.states);
     }
 
     /// Mean share of each cell; nothing without states.

@@ -25,8 +25,8 @@ pub use description::SceneDescription;
 pub use emitters::Emitters;
 pub use features::{DiffuseProfile, Features, FlatProfile, FullProfile, Kernel, PlainProfile, Profile};
 pub use mesh::Mesh;
-pub(crate) use surface::{Side, on_triangle};
 pub use surface::{NO_LIGHT, Surface};
+pub(crate) use surface::{Side, on_triangle};
 
 use crate::embree;
 use description::{FilmDescription, Integrator, ShapeDescription, ShapeGeometry, Sides};

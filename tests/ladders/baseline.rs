@@ -1,10 +1,13 @@
 //! The baseline that knows no temperatures.
 
 use rayon::prelude::*;
-use relt::chain::LargeSteps;
+use relt::{
+    chain::LargeSteps,
+    film::{Filter, Footprint},
+};
 
 use crate::{
-    pssmlt::pssmlt,
+    pssmlt::{pssmlt, pssmlt_images},
     statistics::{f_test, mean, t_test},
     support::two_peaks,
 };
@@ -59,4 +62,24 @@ fn pooling_large_steps_makes_the_normalisation_more_precise() {
     };
     let (two_pass, pooled) = (mean_square(0), mean_square(1));
     assert!(pooled < 0.5 * two_pass, "relative mean square errors {two_pass} and {pooled}");
+}
+
+/// Chains tell by cells of the film, four by four, what the image has: its states, but for those that wait to be recorded,
+/// which are a hundredth at most.
+#[test]
+fn chains_tell_where_on_the_film_they_are() {
+    let footprint = Footprint::new(Filter::Box, COLUMNS, 1);
+    let large_steps = LargeSteps { probability: 0.3, kelemen_weights: false };
+    let ([image, _], whereabouts) =
+        pssmlt_images(&two_peaks(), (&footprint, [COLUMNS, 1]), large_steps, [1 << 12, 1 << 18], 1.0, 0);
+    let total: f64 = image.iter().map(|[grey, ..]| grey).sum();
+    let means = whereabouts.means().expect("states");
+    let mut shares = [0.0; 16];
+    for (x, [grey, ..]) in image.iter().enumerate() {
+        shares[2 * 4 + x / 4] += grey / total; // the toy lies on the line y = 1/2
+    }
+    assert!(shares.iter().filter(|share| **share > 0.05).count() > 1, "{shares:?}");
+    for (mean, share) in means.iter().zip(shares) {
+        assert!((mean - share).abs() < 0.01, "{means:?} for {shares:?}");
+    }
 }

@@ -353,7 +353,7 @@ fn images_of_the_baseline_agree_with_the_integrals() {
         for (kelemen_weights, zeta) in [(false, 1.0), (true, 1.0), (true, 3.0)] {
             let large_steps = LargeSteps { probability: 0.3, kelemen_weights };
             let budget = [1 << 12, EVALUATIONS];
-            let run = |seed| pssmlt_images(&Scattered, (&footprint, SIZE), large_steps, budget, zeta, seed);
+            let run = |seed| pssmlt_images(&Scattered, (&footprint, SIZE), large_steps, budget, zeta, seed).0;
             let runs: Vec<[Vec<[f64; 3]>; 2]> = (0..RUNS).into_par_iter().map(run).collect();
             for (estimate, name) in ["two-pass", "pooled"].iter().enumerate() {
                 let images: Vec<Vec<f64>> = runs.iter().map(|run| run[estimate].as_flattened().to_vec()).collect();

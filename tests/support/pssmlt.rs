@@ -1,7 +1,7 @@
 //! The baseline on an analytic target, as the renderer does it.
 
 use relt::{
-    chain::{Baseline, Evaluator, LargeSteps, Plan, Recorder, Start, Target, baseline_layer, resample},
+    chain::{Baseline, Evaluator, LargeSteps, Plan, Recorder, Start, Target, Whereabouts, baseline_layer, resample},
     film::{Accumulator, Filter, Footprint, Splats},
     path::Contribution,
     rng::{Counter, Purpose, Rng},
@@ -19,11 +19,12 @@ pub fn pssmlt<T: Target>(
 ) -> [Vec<f64>; 2] {
     let footprint = Footprint::new(Filter::Box, columns, 1);
     pssmlt_images(target, (&footprint, [columns, 1]), large_steps, budget, zeta, seed)
+        .0
         .map(|image| image.into_iter().map(|[grey, ..]| grey).collect())
 }
 
 /// An image as Metropolis chains estimate it: scaled by c from the first pass alone, and by c from that and all large
-/// steps.
+/// steps. And where their states were, but for what the last ones have gathered.
 ///
 /// A first pass of `bootstrap` samples, then chains with what is left of `evaluations`. The ζ of the weights is `zeta`
 /// times the first estimate of c.
@@ -34,7 +35,7 @@ pub fn pssmlt_images<T: Target>(
     [bootstrap, evaluations]: [u64; 2],
     zeta: f64,
     seed: u64,
-) -> [Vec<[f64; 3]>; 2] {
+) -> ([Vec<[f64; 3]>; 2], Whereabouts) {
     let rng = Rng::new(seed);
     let counter = |step| Counter { ladder: 0, replica: 0, step, purpose: Purpose::Bootstrap };
     let mut samples = Vec::with_capacity(bootstrap as usize);
@@ -74,8 +75,11 @@ pub fn pssmlt_images<T: Target>(
     let states = film.layer(baseline_layer::CHAINS);
     let proposals = large_steps.kelemen_weights.then(|| film.layer(baseline_layer::LARGE_STEPS));
     let a_pixel = chains.mutations() as f64 / states.len() as f64;
-    [two_pass, pooled].map(|c| {
+    let images = [two_pass, pooled].map(|c| {
         let value = |i: usize, ch: usize| states[i][ch] * c / unit + proposals.as_ref().map_or(0.0, |p| p[i][ch]);
         (0..states.len()).map(|i| [0, 1, 2].map(|ch| value(i, ch) / a_pixel)).collect()
-    })
+    });
+    let [mut whereabouts, later] = chains.whereabouts;
+    whereabouts.merge(&later);
+    (images, whereabouts)
 }
