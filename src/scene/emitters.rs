@@ -145,6 +145,12 @@ impl Emitters {
         [self.probability[light as usize] * place, rest]
     }
 
+    /// Whether next-event estimation chooses places on that light as emission does, by area: true of meshes.
+    #[inline(always)]
+    pub fn aims_by_area<P: Profile>(&self, light: u32) -> bool {
+        P::FLAT_MESHES || matches!(self.lights[light as usize], Light::MeshLight(_))
+    }
+
     /// The light of that index.
     pub fn light(&self, light: u32) -> &Light {
         &self.lights[light as usize]

@@ -102,7 +102,7 @@ pub(super) fn next_event<P: Profile>(
         let cos = site.cos(light.wi);
         // by how much likelier light subpaths start there than next-event estimation looks there
         let (place, density) = match kind {
-            EmitterKind::Surface if P::FLAT_MESHES => (1.0, rest * cos / d2),
+            EmitterKind::Surface if scene.emitters.aims_by_area::<P>(light.light) => (1.0, rest * cos / d2),
             EmitterKind::Surface => {
                 // at the rim of a sphere the cosine is 0, as is `rest`
                 let cos_light = light.normals[0].dot(light.wi).abs().max(LEAST_COSINE);

@@ -158,7 +158,7 @@ impl Particle {
         };
         let tail = match emission.kind {
             EmitterKind::Surface => {
-                if !P::FLAT_MESHES {
+                if !scene.emitters.aims_by_area::<P>(emission.light) {
                     // from where next-event estimation would look: on a sphere or off it makes a difference
                     let from = Site::of(surface).start_towards(-emission.direction);
                     let pdf = scene.emitters.pdf::<P>(emission.light, from, emission.origin, emission.normals[0]);
