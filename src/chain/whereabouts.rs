@@ -104,6 +104,9 @@ mod tests {
         assert!((means.iter().sum::<f64>() - 1.0).abs() < 1e-4);
         let variance = (2.0 + 0.25 * 0.25 + 0.75 * 0.75) / 3.0 - expected.iter().map(|(_, m)| m * m).sum::<f64>();
         assert!((sums.variance() - variance).abs() < 1e-4, "{} for {variance}", sums.variance());
+        let full = Whereabouts { cells: [u64::MAX; CELLS], squares: u64::MAX, states: u64::MAX };
+        sums.merge(&full);
+        assert_eq!(sums, full);
         assert!(Whereabouts::default().variance() == 0.0 && Whereabouts::default().means().is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::vertex::Connection;
+use super::vertex::{Connection, Decisions};
 use crate::{
     embree::{Hits, Rays},
     math::{Frame, place_within, warp},
@@ -18,12 +18,10 @@ use crate::{
 pub(super) const N: usize = 16;
 
 /// Vectors in step.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Vectors([[f32; N]; 3]);
 
 impl Vectors {
-    pub const ZERO: Vectors = Vectors([[0.0; N]; 3]);
-
     #[inline(always)]
     pub fn get(&self, j: usize) -> Vec3 {
         Vec3::new(self.0[0][j], self.0[1][j], self.0[2][j])
@@ -36,6 +34,7 @@ impl Vectors {
 }
 
 /// Where edges of paths end on flat meshes; truths are 0 or 1.
+#[derive(Default)]
 pub(super) struct Ends {
     pub direction: Vectors,
     /// What was hit: corners and barycentric coordinates.
@@ -54,20 +53,6 @@ pub(super) struct Ends {
 }
 
 impl Ends {
-    pub const NONE: Ends = Ends {
-        direction: Vectors::ZERO,
-        corners: [Vectors::ZERO; 3],
-        u: [0.0; N],
-        v: [0.0; N],
-        p: Vectors::ZERO,
-        ng: Vectors::ZERO,
-        back: [0; N],
-        appearance: [0; N],
-        flip: [0; N],
-        diffuse: [0; N],
-        reflectance: Vectors::ZERO,
-    };
-
     /// Fetches what ray number `i` hit.
     #[inline(always)]
     pub fn fetch(&mut self, j: usize, scene: &Scene, rays: &Rays, hits: &Hits, i: usize) {
@@ -128,23 +113,16 @@ impl Ends {
 }
 
 /// [`Connection`]s in step, and whether there are any.
+#[derive(Default)]
 pub(super) struct Connections {
-    pub any: [u32; N],
+    any: [u32; N],
     origin: Vectors,
     direction: Vectors,
     end: [f32; N],
-    pub contribution: Vectors,
+    contribution: Vectors,
 }
 
 impl Connections {
-    pub const NONE: Connections = Connections {
-        any: [0; N],
-        origin: Vectors::ZERO,
-        direction: Vectors::ZERO,
-        end: [0.0; N],
-        contribution: Vectors::ZERO,
-    };
-
     #[inline(always)]
     pub fn set(&mut self, j: usize, connection: Connection, any: bool) {
         let Connection { origin, direction, tfar, contribution } = connection;
@@ -164,10 +142,75 @@ impl Connections {
             contribution: self.contribution.get(j),
         }
     }
+
+    #[inline(always)]
+    pub fn any(&self, j: usize) -> bool {
+        self.any[j] == 1
+    }
+
+    #[inline(always)]
+    pub fn scale(&mut self, j: usize, weight: f32) {
+        self.contribution.set(j, self.contribution.get(j) * weight);
+    }
+}
+
+/// The primary samples of which next edges are made, in step: direction and roulette.
+#[derive(Default)]
+pub(super) struct Choices {
+    direction: [[f32; N]; 2],
+    survival: [f32; N],
+}
+
+impl Choices {
+    #[inline(always)]
+    pub fn set(&mut self, j: usize, decisions: &Decisions) {
+        [self.direction[0][j], self.direction[1][j]] = decisions.direction;
+        self.survival[j] = decisions.roulette.unwrap_or(0.0);
+    }
+
+    #[inline(always)]
+    pub fn direction(&self, j: usize) -> [f32; 2] {
+        [self.direction[0][j], self.direction[1][j]]
+    }
+
+    /// Where roulette is played.
+    #[inline(always)]
+    pub fn survival<const ROULETTE: bool>(&self, j: usize) -> Option<f32> {
+        ROULETTE.then_some(self.survival[j])
+    }
+}
+
+/// Next edges in step, and whether there are any; what they carry is up to the path.
+#[derive(Default)]
+pub(super) struct Edges {
+    any: [u32; N],
+    origin: Vectors,
+    direction: Vectors,
+}
+
+impl Edges {
+    #[inline(always)]
+    pub fn set(&mut self, j: usize, [origin, direction]: [Vec3; 2], any: bool) {
+        self.any[j] = u32::from(any);
+        self.origin.set(j, origin);
+        self.direction.set(j, direction);
+    }
+
+    #[inline(always)]
+    pub fn any(&self, j: usize) -> bool {
+        self.any[j] == 1
+    }
+
+    /// Start and direction.
+    #[inline(always)]
+    pub fn get(&self, j: usize) -> [Vec3; 2] {
+        [self.origin.get(j), self.direction.get(j)]
+    }
 }
 
 /// Places on lights that paths look at in scenes lit by flat meshes: the chosen triangles, and the numbers that choose a place
 /// on each.
+#[derive(Default)]
 pub(super) struct Aims {
     chosen: [[f32; N]; 2],
     /// Corner and edges, unit normal, and the range of the numbers that choose the triangle.
@@ -180,16 +223,6 @@ pub(super) struct Aims {
 }
 
 impl Aims {
-    pub const NONE: Aims = Aims {
-        chosen: [[0.0; N]; 2],
-        face: [Vectors::ZERO; 3],
-        normal: Vectors::ZERO,
-        range: [[0.0; N]; 2],
-        radiance: Vectors::ZERO,
-        inverse_area: [0.0; N],
-        probability: [0.0; N],
-    };
-
     /// Fetches what these primary samples choose.
     #[inline(always)]
     pub fn fetch(&mut self, j: usize, scene: &Scene, place: [f32; 2], light: f32) {

@@ -51,12 +51,7 @@ fn mappings() -> Vec<(&'static str, Settings)> {
     ]
 }
 
-/// By the first so many [`methods`].
-fn check(count: usize, name: &str, scene: &str, radiance: f64, precision: f64) {
-    check_with(&methods()[..count], name, scene, radiance, precision);
-}
-
-fn check_with(methods: &[(&str, Settings)], name: &str, scene: &str, radiance: f64, precision: f64) {
+fn check(methods: &[(&str, Settings)], name: &str, scene: &str, radiance: f64, precision: f64) {
     let scene = scene_of(scene);
     let expected = Expected::constant(24, 16, [radiance as f32; 3]);
     for (method, settings) in methods {
@@ -73,7 +68,8 @@ fn closed_rooms_that_glow_are_as_bright_as_their_series() {
         for albedo in [0.2, 0.5, 0.9] {
             let (name, scene) = (format!("{shape}-{albedo}"), closed(shape, albedo, -1, 5));
             // What else there is tells no more of longer and shorter series, which take most of the time.
-            check(if albedo == 0.5 { 4 } else { 2 }, &name, &scene, 1.0 / (1.0 - albedo), 0.005);
+            let count = if albedo == 0.5 { 4 } else { 2 };
+            check(&methods()[..count], &name, &scene, 1.0 / (1.0 - albedo), 0.005);
         }
     }
 }
@@ -82,23 +78,23 @@ fn closed_rooms_that_glow_are_as_bright_as_their_series() {
 /// glass and mirrors in a sky.
 #[test]
 fn closed_rooms_and_clear_bodies_are_as_bright_by_all_mappings() {
-    check_with(&mappings(), "cube", &closed("cube", 0.5, -1, 2), 2.0, 0.01);
-    check_with(&mappings(), "sphere", &closed("sphere", 0.5, 5, 5), 1.9375, 0.01);
+    check(&mappings(), "cube", &closed("cube", 0.5, -1, 2), 2.0, 0.01);
+    check(&mappings(), "sphere", &closed("sphere", 0.5, 5, 5), 1.9375, 0.01);
     let lens = "type='thinlens'><float name='aperture_radius' value='0.3'/><float name='focus_distance' value='1'/>";
     let scene = closed("cube", 0.5, 4, 5).replace("type='perspective'>", lens);
-    check_with(&mappings()[1..3], "lens", &scene, 1.875, 0.01);
+    check(&mappings()[1..3], "lens", &scene, 1.875, 0.01);
     let sky = "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>";
     for (name, bsdf) in [("glass", "<bsdf type='dielectric'/>"), ("mirror", "<bsdf type='conductor'/>")] {
         let ball = format!("<shape type='sphere'><float name='radius' value='0.9'/>{bsdf}</shape>");
         let scene = format!("{}{ball}{sky}", view("0, 0, 2.5", "0, 0, 0", -1, 5));
-        check_with(&mappings()[..3], name, &scene, 1.0, 0.02);
+        check(&mappings()[..3], name, &scene, 1.0, 0.02);
     }
 }
 
 /// Roulette from the first bounce on changes noise and nothing else.
 #[test]
 fn closed_rooms_are_as_bright_with_roulette_from_the_start() {
-    check(3, "roulette", &closed("cube", 0.5, -1, 1), 2.0, 0.005);
+    check(&methods()[..3], "roulette", &closed("cube", 0.5, -1, 1), 2.0, 0.005);
 }
 
 /// However wide the lens, a room that is equally bright everywhere looks it.
@@ -107,7 +103,7 @@ fn closed_rooms_are_as_bright_through_a_lens() {
     let lens = "type='thinlens'><float name='aperture_radius' value='0.3'/><float name='focus_distance' value='1'/>";
     let scene = closed("cube", 0.5, -1, 5).replace("type='perspective'>", lens);
     assert!(scene.contains(lens));
-    check(2, "lens", &scene, 2.0, 0.005);
+    check(&methods()[..2], "lens", &scene, 2.0, 0.005);
 }
 
 /// Weights of either sign make a constant of a constant.
@@ -115,7 +111,7 @@ fn closed_rooms_are_as_bright_through_a_lens() {
 fn closed_rooms_are_as_bright_through_a_filter_with_negative_lobes() {
     let scene = closed("cube", 0.5, -1, 5).replace("<rfilter type='box'/>", "<rfilter type='lanczos'/>");
     assert!(scene.contains("lanczos"));
-    check(3, "lanczos", &scene, 2.0, 0.005);
+    check(&methods()[..3], "lanczos", &scene, 2.0, 0.005);
 }
 
 /// Paths of up to n edges meet n emitting walls: Σ aⁱ over i < n, which is (1 − aⁿ)/(1 − a).
@@ -123,13 +119,9 @@ fn closed_rooms_are_as_bright_through_a_filter_with_negative_lobes() {
 fn closed_rooms_of_finite_depth_are_as_bright_as_the_finite_series() {
     for depth in [1, 2, 3, 7] {
         let radiance = (1.0 - 0.8f64.powi(depth)) / (1.0 - 0.8);
-        check(
-            if depth == 7 { 4 } else { 2 },
-            &format!("depth-{depth}"),
-            &closed("cube", 0.8, depth, 5),
-            radiance,
-            0.005,
-        );
+        let count = if depth == 7 { 4 } else { 2 };
+        let (name, scene) = (format!("depth-{depth}"), closed("cube", 0.8, depth, 5));
+        check(&methods()[..count], &name, &scene, radiance, 0.005);
     }
 }
 
@@ -162,6 +154,6 @@ fn bodies_that_absorb_nothing_vanish_in_a_uniform_world() {
         ),
     ] {
         let sky = "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>";
-        check(4, name, &format!("{}{body}{sky}", view("0, 0, 2.5", "0, 0, 0", -1, 5)), 1.0, 0.005);
+        check(&methods(), name, &format!("{}{body}{sky}", view("0, 0, 2.5", "0, 0, 0", -1, 5)), 1.0, 0.005);
     }
 }

@@ -76,6 +76,19 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
+    /// Goes through all hits, by slot and lane, one by one; how many subpaths go on.
+    #[inline(always)]
+    fn at_each_hit(&mut self, mut scatter: impl FnMut(&mut Arrays, [u32; 2], usize) -> usize) -> usize {
+        let mut kept = 0;
+        // the lists are lent out while the other arrays are written to
+        let (slots, lanes) = (std::mem::take(&mut self.hit_slots), std::mem::take(&mut self.hit_lanes));
+        for (&slot, &lane) in slots.iter().zip(&lanes) {
+            kept = scatter(self, [slot, lane], kept);
+        }
+        (self.hit_slots, self.hit_lanes) = (slots, lanes);
+        kept
+    }
+
     /// The edge with which the `place`-th light subpath that goes on does so.
     #[inline(always)]
     fn go_on_from_light(&mut self, place: usize, lane: u32, edge: &LightEdge) {
@@ -327,13 +340,7 @@ fn scatter_light<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, proposals
     let kept = if P::FLAT_MESHES && !P::VARYING {
         side_by_side::light::scatter_light::<P, HOW>(mapping, j, proposals, w)
     } else {
-        let mut kept = 0;
-        let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
-        for (&slot, &lane) in slots.iter().zip(&lanes) {
-            kept = scatter_light_one::<P, HOW>(mapping, j, proposals, w, [slot, lane], kept);
-        }
-        (w.hit_slots, w.hit_lanes) = (slots, lanes);
-        kept
+        w.at_each_hit(|w, hit, kept| scatter_light_one::<P, HOW>(mapping, j, proposals, w, hit, kept))
     };
     w.lanes.truncate(kept);
     w.particles.truncate(kept);
@@ -522,13 +529,7 @@ fn scatter_camera<P: Profile, const HOW: u8>(
     let kept = if P::FLAT_MESHES && !P::VARYING {
         side_by_side::camera::scatter_camera::<P, HOW>(mapping, j, proposals, w, out)
     } else {
-        let mut kept = 0;
-        let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes)); // lent out
-        for (&slot, &lane) in slots.iter().zip(&lanes) {
-            kept = scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, [slot, lane], kept);
-        }
-        (w.hit_slots, w.hit_lanes) = (slots, lanes);
-        kept
+        w.at_each_hit(|w, hit, kept| scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, hit, kept))
     };
     w.lanes.truncate(kept);
     w.carried.truncate(kept);

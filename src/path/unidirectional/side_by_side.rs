@@ -15,7 +15,7 @@ use super::{Arrays, Connection, Edge, shade_one, vertex};
 use crate::{
     path::{
         Mapping,
-        lanes::{Aims, Connections, Ends, N, Vectors},
+        lanes::{Aims, Choices, Connections, Edges, Ends, N, Vectors},
         vertex::{Carried, Decisions, Roulette},
     },
     sample::Proposals,
@@ -23,44 +23,21 @@ use crate::{
 };
 
 /// Vertices of a group of paths, as a structure of arrays; truths are 0 or 1.
+#[derive(Default)]
 pub(super) struct Group {
     /// The edges that led there.
     ends: Ends,
     throughput: Vectors,
     survival: [f32; N],
-    /// Primary samples: direction, place on the light, roulette.
-    chosen_direction: [[f32; N]; 2],
+    choices: Choices,
     aims: Aims,
-    chosen_survival: [f32; N],
     /// To lights.
     connections: Connections,
-    /// Next edges, and whether there are any.
-    goes_on: [u32; N],
-    next_origin: Vectors,
-    next_direction: Vectors,
+    /// Next edges, and what they carry.
+    next: Edges,
     next_throughput: Vectors,
     next_pdf: [f32; N],
     next_survival: [f32; N],
-}
-
-impl Default for Group {
-    fn default() -> Group {
-        Group {
-            ends: Ends::NONE,
-            throughput: Vectors::ZERO,
-            survival: [0.0; N],
-            chosen_direction: [[0.0; N]; 2],
-            aims: Aims::NONE,
-            chosen_survival: [0.0; N],
-            connections: Connections::NONE,
-            goes_on: [0; N],
-            next_origin: Vectors::ZERO,
-            next_direction: Vectors::ZERO,
-            next_throughput: Vectors::ZERO,
-            next_pdf: [0.0; N],
-            next_survival: [0.0; N],
-        }
-    }
 }
 
 /// The work of a bounce: at every hit emission, a light to connect to, and the next edge, as `shade` does them.
@@ -112,10 +89,10 @@ impl<P: Profile> NullaryFnOnce for Shade<'_, P> {
                     kept = shade_one::<P>(mapping, bounce, proposals, w, [slot, lane], kept);
                     continue;
                 }
-                if lit && g.connections.any[j] == 1 {
+                if lit && g.connections.any(j) {
                     w.connect(lane, &g.connections.get(j));
                 }
-                if g.goes_on[j] == 1 {
+                if g.next.any(j) {
                     w.go_on(kept, lane, &g.edge(j));
                     kept += 1;
                 }
@@ -159,8 +136,7 @@ fn fetch_choices(mapping: &Mapping, bounce: u16, proposals: &Proposals, lanes: &
     for (j, &lane) in lanes.iter().enumerate() {
         let choices = choices.map(|block| proposals.block(block, lane as usize));
         let decisions = Decisions::new(layout, bounce, proposals.block(first, lane as usize), choices);
-        [g.chosen_direction[0][j], g.chosen_direction[1][j]] = decisions.direction;
-        g.chosen_survival[j] = decisions.roulette.unwrap_or(0.0);
+        g.choices.set(j, &decisions);
         g.aims.fetch(j, scene, decisions.light_place, decisions.light);
     }
 }
@@ -184,15 +160,12 @@ fn look_at_lights(g: &mut Group) {
 fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
         let (frame, wo) = g.ends.seen(j);
-        let chosen = [g.chosen_direction[0][j], g.chosen_direction[1][j]];
-        let (sample, above) = g.ends.material(j).sample_anyhow(wo, chosen);
-        let u = ROULETTE.then_some(g.chosen_survival[j]);
+        let (sample, above) = g.ends.material(j).sample_anyhow(wo, g.choices.direction(j));
+        let u = g.choices.survival::<ROULETTE>(j);
         let from = (g.ends.p.get(j), g.ends.ng.get(j), &frame);
         let (edge, goes_on) = vertex::scattered(from, sample, &g.carried(j), u, Roulette::Vertex);
-        g.goes_on[j] = u32::from(above & goes_on);
         let Edge { origin, direction, carried } = edge;
-        g.next_origin.set(j, origin);
-        g.next_direction.set(j, direction);
+        g.next.set(j, [origin, direction], above & goes_on);
         g.next_throughput.set(j, carried.throughput);
         g.next_pdf[j] = carried.pdf;
         g.next_survival[j] = carried.survival;
@@ -215,6 +188,7 @@ impl Group {
             survival: self.next_survival[j],
             ..Carried::START
         };
-        Edge { origin: self.next_origin.get(j), direction: self.next_direction.get(j), carried }
+        let [origin, direction] = self.next.get(j);
+        Edge { origin, direction, carried }
     }
 }

@@ -7,13 +7,13 @@ use super::{
         Arrays, CameraEnd, ONE, Site, add_connection, collect_hit, connections, join, scatter_camera_one, subpath,
         weights,
     },
-    Steps, Tails,
+    Arrivals, Departures,
 };
 use crate::{
     math::widest,
     path::{
         Contributions, Mapping,
-        lanes::{Aims, Connections, Ends, N, Vectors},
+        lanes::{Aims, Choices, Connections, Edges, Ends, N, Vectors},
         vertex::{self, Carried, Decisions, Edge, Roulette},
     },
     sample::Proposals,
@@ -25,28 +25,22 @@ use crate::{
 };
 
 /// Vertices of a group of camera subpaths, as a structure of arrays; truths are 0 or 1.
+#[derive(Default)]
 pub struct Group {
-    /// The edges that led there: where they start, what they carry, and where they end.
-    from: Vectors,
+    /// The edges that led there: what they carry and where they end.
     throughput: Vectors,
     pdf: [f32; N],
     eta: [f32; N],
     survival: [f32; N],
-    step: Steps,
     ends: Ends,
-    /// What the tail follows from: place on the lens and density of the camera's rays there for first vertices, square of the
-    /// distance for others, and |cos|.
+    arrivals: Arrivals,
+    /// What the tails of first vertices follow from instead: place on the lens and density of the camera's rays there.
     lens: [[f32; N]; 2],
     seen: [f32; N],
-    distance2: [f32; N],
-    cos: [f32; N],
-    tail: Tails,
     /// Whether the surface is a light.
     shines: [u32; N],
-    /// Primary samples: direction, place on the light, roulette.
-    chosen_direction: [[f32; N]; 2],
+    choices: Choices,
     aims: Aims,
-    chosen_survival: [f32; N],
     /// To lights.
     connections: Connections,
     /// How dense scattering makes them over how dense they are; and the density of the vertex from the light's side, per area,
@@ -55,54 +49,12 @@ pub struct Group {
     light_density: [f32; N],
     back_pdf: [f32; N],
     weight: [f32; N],
-    /// Next edges, and whether there are any.
-    goes_on: [u32; N],
-    next_origin: Vectors,
-    next_direction: Vectors,
+    /// Next edges, and what they carry, but for the density of the direction.
+    next: Edges,
     next_throughput: Vectors,
     next_eta: [f32; N],
     next_survival: [f32; N],
-    /// Densities of their directions, forwards and back, |cos|, and what follows.
-    next_pdf: [[f32; N]; 2],
-    next_cos: [f32; N],
-    next_step: Steps,
-}
-
-impl Default for Group {
-    fn default() -> Group {
-        Group {
-            ends: Ends::NONE,
-            from: Vectors::ZERO,
-            throughput: Vectors::ZERO,
-            pdf: [1.0; N],
-            eta: [1.0; N],
-            survival: [1.0; N],
-            step: Steps::NOWHERE,
-            lens: [[0.0; N]; 2],
-            seen: [0.0; N],
-            distance2: [0.0; N],
-            cos: [0.0; N],
-            tail: Tails::NONE,
-            shines: [0; N],
-            chosen_direction: [[0.0; N]; 2],
-            aims: Aims::NONE,
-            chosen_survival: [0.0; N],
-            connections: Connections::NONE,
-            ratio: [0.0; N],
-            light_density: [0.0; N],
-            back_pdf: [0.0; N],
-            weight: [0.0; N],
-            goes_on: [0; N],
-            next_origin: Vectors::ZERO,
-            next_direction: Vectors::ZERO,
-            next_throughput: Vectors::ZERO,
-            next_eta: [1.0; N],
-            next_survival: [1.0; N],
-            next_pdf: [[1.0; N]; 2],
-            next_cos: [0.0; N],
-            next_step: Steps::NOWHERE,
-        }
-    }
+    departures: Departures,
 }
 
 /// At every hit of a camera subpath, its vertex number `j`: emission, connections, and the next edge, which replaces the one
@@ -143,7 +95,7 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
                 continue;
             }
             if g.shines[k] == 1 {
-                let (i, tail) = (slot as usize, g.tail.get(k));
+                let (i, tail) = (slot as usize, g.arrivals.tail.get(k));
                 let hit = w.hits.get(i).expect("misses are gone");
                 let surface = scene.surface::<P>(hit, w.rays.origin(i), w.rays.direction(i));
                 let end = CameraEnd { carried: w.carried[i], tail };
@@ -153,15 +105,15 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
                 continue;
             }
             let chosen = (HOW == ONE).then(|| w.chosen[lane as usize]);
-            if lit && g.connections.any[k] == 1 && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
+            if lit && g.connections.any(k) && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
                 add_connection::<HOW>(mapping, w, lane, g.connections.get(k), [1, j + 1], g.survival[k]);
             }
             if techniques.inner {
-                let end = CameraEnd { carried: g.carried(k), tail: g.tail.get(k) };
+                let end = CameraEnd { carried: g.carried(k), tail: g.arrivals.tail.get(k) };
                 join::<P, HOW>(mapping, j, proposals, w, lane, &end, &g.site(k, scene));
             }
-            if g.goes_on[k] == 1 && chosen.is_none_or(|chosen| chosen.camera != j + 1) {
-                w.go_on_from_camera(kept, [slot, lane], &g.edge(k), g.next_step.get(k));
+            if g.next.any(k) && chosen.is_none_or(|chosen| chosen.camera != j + 1) {
+                w.go_on_from_camera(kept, [slot, lane], &g.edge(k), g.departures.step.get(k));
                 kept += 1;
             }
         }
@@ -176,14 +128,14 @@ fn fetch_hits(scene: &Scene, w: &Arrays, j: u16, [slots, lanes]: [&[u32]; 2], g:
     for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
         let i = slot as usize;
         g.ends.fetch(k, scene, &w.rays, &w.hits, i);
-        g.from.set(k, w.rays.origin(i));
+        g.arrivals.from.set(k, w.rays.origin(i));
         let carried = &w.carried[i];
         g.throughput.set(k, carried.throughput);
         (g.pdf[k], g.eta[k], g.survival[k]) = (carried.pdf, carried.eta, carried.survival);
         if j == 1 {
             [g.lens[0][k], g.lens[1][k]] = w.lens[lane as usize];
         } else {
-            g.step.set(k, w.steps[i]);
+            g.arrivals.step.set(k, w.steps[i]);
         }
     }
 }
@@ -202,13 +154,10 @@ impl NullaryFnOnce for Meet<'_> {
     fn call(self) {
         let Meet { g, camera, first } = self;
         for j in 0..N {
-            g.cos[j] = g.ends.meet(j).abs();
-            g.distance2[j] = (g.ends.p.get(j) - g.from.get(j)).length_squared();
+            g.arrivals.meet(j, &mut g.ends);
         }
         if !first {
-            for j in 0..N {
-                g.tail.set(j, g.step.get(j).arrive(g.distance2[j], g.cos[j]));
-            }
+            g.arrivals.follow();
             return;
         }
         let camera = *camera; // what the loop writes to cannot be part of it
@@ -217,7 +166,7 @@ impl NullaryFnOnce for Meet<'_> {
             eye => see(&camera, eye, g),
         }
         for j in 0..N {
-            g.tail.set(j, subpath::seen_with(g.seen[j], g.cos[j]));
+            g.arrivals.tail.set(j, subpath::seen_with(g.seen[j], g.arrivals.cos[j]));
         }
     }
 }
@@ -248,8 +197,7 @@ fn fetch_choices<const HOW: u8>(
         let at = lane as usize;
         let choices = choices.map(|block| proposals.block(block, at));
         let decisions = Decisions::new(layout, bounce, proposals.block(first, at), choices);
-        [g.chosen_direction[0][k], g.chosen_direction[1][k]] = decisions.direction;
-        g.chosen_survival[k] = decisions.roulette.unwrap_or(0.0);
+        g.choices.set(k, &decisions);
         if lit && (HOW != ONE || w.chosen[at].is(1, j + 1)) {
             g.aims.fetch(k, scene, decisions.light_place, decisions.light);
             looks = true;
@@ -288,11 +236,7 @@ impl NullaryFnOnce for Leave<'_> {
         } else {
             scatter::<false>(g);
         }
-        for j in 0..N {
-            let densities = Some([g.next_pdf[0][j], g.next_pdf[1][j]]);
-            let step = g.tail.get(j).leave(densities, g.next_cos[j], compared);
-            g.next_step.set(j, step);
-        }
+        g.departures.follow(&g.arrivals.tail, compared);
     }
 }
 
@@ -320,13 +264,13 @@ fn look_at_lights(g: &mut Group) {
 #[inline(always)]
 fn weigh(compared: bool, g: &mut Group) {
     for j in 0..N {
-        let (tail, ratio) = (g.tail.get(j), f64::from(g.ratio[j]));
+        let (tail, ratio) = (g.arrivals.tail.get(j), f64::from(g.ratio[j]));
         let back = if tail.earlier > 0.0 { f64::from(g.back_pdf[j]) } else { 0.0 };
         let others = ratio * ratio + tail.others(f64::from(g.light_density[j]), back, compared);
         g.weight[j] = weights::weight(others);
     }
     for j in 0..N {
-        g.connections.contribution.set(j, g.connections.contribution.get(j) * g.weight[j]);
+        g.connections.scale(j, g.weight[j]);
     }
 }
 
@@ -337,18 +281,15 @@ fn scatter<const ROULETTE: bool>(g: &mut Group) {
         let (frame, wo) = g.ends.seen(j);
         let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
         let material = g.ends.material(j);
-        let (sample, above) = material.sample_anyhow(wo, [g.chosen_direction[0][j], g.chosen_direction[1][j]]);
-        let u = ROULETTE.then_some(g.chosen_survival[j]);
+        let (sample, above) = material.sample_anyhow(wo, g.choices.direction(j));
+        let u = g.choices.survival::<ROULETTE>(j);
         let (edge, goes_on) = vertex::scattered((p, ng, &frame), sample, &g.carried(j), u, Roulette::Path);
         let Edge { origin, direction, carried } = edge;
-        g.goes_on[j] = u32::from(above & goes_on);
-        g.next_origin.set(j, origin);
-        g.next_direction.set(j, direction);
+        g.next.set(j, [origin, direction], above & goes_on);
         g.next_throughput.set(j, carried.throughput);
         (g.next_eta[j], g.next_survival[j]) = (carried.eta, carried.survival);
         let back = material.evaluate(frame.to_local(direction), wo).pdf;
-        [g.next_pdf[0][j], g.next_pdf[1][j]] = [carried.pdf, back];
-        g.next_cos[j] = ng.dot(direction).abs();
+        g.departures.set(j, [carried.pdf, back], ng.dot(direction).abs());
     }
 }
 
@@ -368,10 +309,11 @@ impl Group {
     fn edge(&self, j: usize) -> Edge {
         let carried = Carried {
             throughput: self.next_throughput.get(j),
-            pdf: self.next_pdf[0][j],
+            pdf: self.departures.pdf[0][j],
             eta: self.next_eta[j],
             survival: self.next_survival[j],
         };
-        Edge { origin: self.next_origin.get(j), direction: self.next_direction.get(j), carried }
+        let [origin, direction] = self.next.get(j);
+        Edge { origin, direction, carried }
     }
 }

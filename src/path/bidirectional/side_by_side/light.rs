@@ -9,13 +9,13 @@ use super::{
         subpath::{Arrival, LightEdge, Particle},
         weights,
     },
-    Steps, Tails,
+    Arrivals, Departures,
 };
 use crate::{
     math::{offset_origin, widest},
     path::{
         Mapping,
-        lanes::{Connections, Ends, N, Vectors},
+        lanes::{Choices, Connections, Edges, Ends, N, Vectors},
         vertex::Decisions,
     },
     sample::Proposals,
@@ -26,22 +26,18 @@ use crate::{
 };
 
 /// Vertices of a group of light subpaths, as a structure of arrays; truths are 0 or 1.
+#[derive(Default)]
 pub struct Group {
-    /// The edges that led there: where densities take them to start, what they carry, and where they end.
-    from: Vectors,
+    /// The edges that led there: what they carry and where they end.
     flux: Vectors,
     survival: [f32; N],
-    step: Steps,
     ends: Ends,
-    /// The arrival there, and what its tail follows from: square of the distance, |cos|.
+    /// The arrival there.
     arrived: Vectors,
-    distance2: [f32; N],
-    cos: [f32; N],
-    tail: Tails,
-    /// Place on the lens, and primary samples: direction and roulette.
+    arrivals: Arrivals,
+    /// Place on the lens.
     lens: [[f32; N]; 2],
-    chosen_direction: [[f32; N]; 2],
-    chosen_survival: [f32; N],
+    choices: Choices,
     /// To the camera, and where that is on the film.
     connections: Connections,
     film: [[f32; N]; 2],
@@ -49,48 +45,11 @@ pub struct Group {
     camera_density: [f32; N],
     back_pdf: [f32; N],
     weight: [f32; N],
-    /// Next edges, and whether there are any.
-    goes_on: [u32; N],
-    next_origin: Vectors,
-    next_direction: Vectors,
+    /// Next edges, and what they carry.
+    next: Edges,
     next_flux: Vectors,
     next_survival: [f32; N],
-    /// Densities of their directions, forwards and back, |cos|, and what follows.
-    next_pdf: [[f32; N]; 2],
-    next_cos: [f32; N],
-    next_step: Steps,
-}
-
-impl Default for Group {
-    fn default() -> Group {
-        Group {
-            ends: Ends::NONE,
-            from: Vectors::ZERO,
-            flux: Vectors::ZERO,
-            survival: [1.0; N],
-            step: Steps::NOWHERE,
-            arrived: Vectors::ZERO,
-            distance2: [0.0; N],
-            cos: [0.0; N],
-            tail: Tails::NONE,
-            lens: [[0.0; N]; 2],
-            chosen_direction: [[0.0; N]; 2],
-            chosen_survival: [0.0; N],
-            connections: Connections::NONE,
-            film: [[0.0; N]; 2],
-            camera_density: [0.0; N],
-            back_pdf: [0.0; N],
-            weight: [0.0; N],
-            goes_on: [0; N],
-            next_origin: Vectors::ZERO,
-            next_direction: Vectors::ZERO,
-            next_flux: Vectors::ZERO,
-            next_survival: [1.0; N],
-            next_pdf: [[0.0; N]; 2],
-            next_cos: [0.0; N],
-            next_step: Steps::NOWHERE,
-        }
-    }
+    departures: Departures,
 }
 
 /// At every hit of a light subpath, its vertex number `j`: the lens to connect to, and the next edge, which replaces the one
@@ -128,13 +87,13 @@ pub fn scatter_light<P: Profile, const HOW: u8>(
                 continue;
             }
             let last = is_last::<HOW>(w, lane, j);
-            if g.connections.any[k] == 1 && (HOW != ONE || last && w.chosen[lane as usize].camera == 1) {
+            if g.connections.any(k) && (HOW != ONE || last && w.chosen[lane as usize].camera == 1) {
                 add_splat::<HOW>(mapping, j, w, lane, g.splat(k), g.survival[k]);
             }
             if techniques.inner && (HOW != ONE || last && w.chosen[lane as usize].camera > 1) {
                 keep_vertex::<HOW>(j, proposals, w, lane, g.vertex(k));
             }
-            if goes_on && !last && g.goes_on[k] == 1 {
+            if goes_on && !last && g.next.any(k) {
                 w.go_on_from_light(kept, lane, &g.edge(k));
                 kept += 1;
             }
@@ -159,8 +118,8 @@ fn fetch_hits(mapping: &Mapping, w: &Arrays, j: u16, slots: &[u32], g: &mut Grou
                 1 => (w.emissions[i].origin, subpath::first_step(techniques, &w.emissions[i])),
                 _ => (w.rays.origin(i), w.steps[i]),
             };
-            g.from.set(k, from);
-            g.step.set(k, step);
+            g.arrivals.from.set(k, from);
+            g.arrivals.step.set(k, step);
         }
     }
 }
@@ -179,16 +138,12 @@ impl NullaryFnOnce for Meet<'_> {
     fn call(self) {
         let Meet { g, weighs } = self;
         for j in 0..N {
-            let cos = g.ends.meet(j).abs();
+            let cos = g.arrivals.meet(j, &mut g.ends);
             let particle = Particle { flux: g.flux.get(j), survival: g.survival[j] };
             g.arrived.set(j, particle.arrive(cos, subpath::STRAIGHT_OUT).flux);
-            g.distance2[j] = (g.ends.p.get(j) - g.from.get(j)).length_squared();
-            g.cos[j] = cos;
         }
         if weighs {
-            for j in 0..N {
-                g.tail.set(j, g.step.get(j).arrive(g.distance2[j], g.cos[j]));
-            }
+            g.arrivals.follow();
         }
     }
 }
@@ -199,9 +154,7 @@ fn fetch_choices(mapping: &Mapping, j: u16, w: &Arrays, proposals: &Proposals, l
     let layout = mapping.layout();
     for (k, &lane) in lanes.iter().enumerate() {
         let block = proposals.block(layout.light_bounce(j - 1), lane as usize);
-        let decisions = Decisions::of_light(layout, j - 1, block, true);
-        [g.chosen_direction[0][k], g.chosen_direction[1][k]] = decisions.direction;
-        g.chosen_survival[k] = decisions.roulette.unwrap_or(0.0);
+        g.choices.set(k, &Decisions::of_light(layout, j - 1, block, true));
         [g.lens[0][k], g.lens[1][k]] = w.lens[lane as usize];
     }
 }
@@ -241,7 +194,7 @@ impl NullaryFnOnce for Leave<'_> {
             (true, true) => scatter::<true>(g),
         }
         if let Some(compared) = weighed {
-            step(compared, g);
+            g.departures.follow(&g.arrivals.tail, compared);
         }
     }
 }
@@ -268,11 +221,11 @@ fn look(camera: &Camera, eye: Eye, g: &mut Group) {
 #[inline(always)]
 fn weigh(compared: bool, g: &mut Group) {
     for j in 0..N {
-        let others = g.tail.get(j).others(f64::from(g.camera_density[j]), f64::from(g.back_pdf[j]), compared);
+        let others = g.arrivals.tail.get(j).others(f64::from(g.camera_density[j]), f64::from(g.back_pdf[j]), compared);
         g.weight[j] = weights::weight(others);
     }
     for j in 0..N {
-        g.connections.contribution.set(j, g.connections.contribution.get(j) * g.weight[j]);
+        g.connections.scale(j, g.weight[j]);
     }
 }
 
@@ -282,31 +235,18 @@ fn scatter<const ROULETTE: bool>(g: &mut Group) {
     for j in 0..N {
         let (frame, wo) = g.ends.seen(j);
         let material = g.ends.material(j);
-        let (sample, above) = material.sample_anyhow(wo, [g.chosen_direction[0][j], g.chosen_direction[1][j]]);
+        let (sample, above) = material.sample_anyhow(wo, g.choices.direction(j));
         let there = material.evaluate(sample.wi, wo);
         let (direction, back) = (frame.to_world(sample.wi), frame.to_world(wo));
         let (p, ng) = (g.ends.p.get(j), g.ends.ng.get(j));
         let (cos_before, cos) = (ng.dot(back).abs(), ng.dot(direction).abs());
         let arrival = Arrival { flux: g.arrived.get(j), tail: subpath::STRAIGHT_OUT, survival: g.survival[j] };
-        let u = ROULETTE.then_some(g.chosen_survival[j]);
+        let u = g.choices.survival::<ROULETTE>(j);
         let (particle, goes_on) = arrival.scattered(there.value / sample.pdf, [cos_before, cos], u);
-        g.goes_on[j] = u32::from(above & goes_on);
-        g.next_origin.set(j, start_towards(p, ng, direction));
-        g.next_direction.set(j, direction);
+        g.next.set(j, [start_towards(p, ng, direction), direction], above & goes_on);
         g.next_flux.set(j, particle.flux);
         g.next_survival[j] = particle.survival;
-        [g.next_pdf[0][j], g.next_pdf[1][j]] = [sample.pdf, there.pdf];
-        g.next_cos[j] = cos;
-    }
-}
-
-/// What weights will need of the next edges.
-#[inline(always)]
-fn step(compared: bool, g: &mut Group) {
-    for j in 0..N {
-        let densities = Some([g.next_pdf[0][j], g.next_pdf[1][j]]);
-        let step = g.tail.get(j).leave(densities, g.next_cos[j], compared);
-        g.next_step.set(j, step);
+        g.departures.set(j, [sample.pdf, there.pdf], cos);
     }
 }
 
@@ -324,17 +264,15 @@ impl Group {
 
     fn vertex(&self, j: usize) -> LightVertex {
         let (frame, wo) = self.ends.seen(j);
-        let arrival = Arrival { flux: self.arrived.get(j), tail: self.tail.get(j), survival: self.survival[j] };
+        let arrival =
+            Arrival { flux: self.arrived.get(j), tail: self.arrivals.tail.get(j), survival: self.survival[j] };
         LightVertex::flat([self.ends.p.get(j), self.ends.ng.get(j)], frame, wo, self.ends.appearance[j], arrival)
     }
 
     #[inline(always)]
     fn edge(&self, j: usize) -> LightEdge {
-        LightEdge {
-            origin: self.next_origin.get(j),
-            direction: self.next_direction.get(j),
-            particle: Particle { flux: self.next_flux.get(j), survival: self.next_survival[j] },
-            step: self.next_step.get(j),
-        }
+        let [origin, direction] = self.next.get(j);
+        let particle = Particle { flux: self.next_flux.get(j), survival: self.next_survival[j] };
+        LightEdge { origin, direction, particle, step: self.departures.step.get(j) }
     }
 }
