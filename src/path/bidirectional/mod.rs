@@ -38,9 +38,23 @@ use crate::{
     scene::{Mixture, NO_LIGHT, Profile, Rgb, Scattering, Surface, lights::Emission},
 };
 
+/// What becomes of the techniques.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum How {
+    /// All are summed up.
+    #[default]
+    Sum,
+    /// Points choose one of them.
+    One,
+    /// All are listed, each with the probability that a point chooses it.
+    Open,
+}
+
 /// Arrays that evaluating a batch fills; reused, so that nothing is allocated once they have grown.
 #[derive(Default)]
 pub(super) struct Arrays {
+    /// What becomes of the batch's techniques.
+    how: How,
     /// Lanes that do not rest.
     live: Vec<u32>,
     /// By lane: position on the film, place on the lens, radiance there.
@@ -152,14 +166,6 @@ impl Waiting {
     }
 }
 
-/// What becomes of the techniques.
-/// All are summed up.
-const SUM: u8 = 0;
-/// Points choose one of them.
-const ONE: u8 = 1;
-/// All are listed, each with the probability that a point chooses it.
-const OPEN: u8 = 2;
-
 /// All techniques of a batch.
 pub(super) fn evaluate<P: Profile>(
     mapping: &Mapping,
@@ -167,7 +173,7 @@ pub(super) fn evaluate<P: Profile>(
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    trace_both::<P, SUM>(mapping, proposals, out, workspace);
+    trace_both::<P>(How::Sum, mapping, proposals, out, workspace);
 }
 
 /// One technique for each point of a batch.
@@ -177,7 +183,7 @@ pub(super) fn multiplexed<P: Profile>(
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    trace_both::<P, ONE>(mapping, proposals, out, workspace);
+    trace_both::<P>(How::One, mapping, proposals, out, workspace);
 }
 
 /// All techniques of a batch of points that could choose one, each by itself.
@@ -187,29 +193,31 @@ pub(super) fn open<P: Profile>(
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
-    trace_both::<P, OPEN>(mapping, proposals, out, workspace);
+    trace_both::<P>(How::Open, mapping, proposals, out, workspace);
 }
 
-fn trace_both<P: Profile, const HOW: u8>(
+fn trace_both<P: Profile>(
+    how: How,
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
     workspace: &mut Workspace,
 ) {
     let Workspace { tracing, bidirectional: w, .. } = workspace;
-    begin::<HOW>(mapping, proposals, out, w);
-    follow_light::<P, HOW>(mapping, proposals, out, tracing, w);
+    w.how = how;
+    begin(mapping, proposals, out, w);
+    follow_light::<P>(mapping, proposals, out, tracing, w);
     if mapping.kind().techniques().follow_camera() {
-        follow_camera::<P, HOW>(mapping, proposals, out, tracing, w);
+        follow_camera::<P>(mapping, proposals, out, tracing, w);
     }
-    if HOW == OPEN && mapping.views_left_open() {
+    if w.how == How::Open && mapping.views_left_open() {
         views::look::<P>(mapping, proposals, tracing, w, out);
     }
-    if HOW == OPEN { settle_outcomes(proposals, out) } else { settle::<HOW>(proposals, w, out) }
+    if w.how == How::Open { settle_outcomes(proposals, out) } else { settle(proposals, w, out) }
 }
 
 /// Draws what is chosen for both subpaths, and forgets all lanes' past.
-fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut Contributions, w: &mut Arrays) {
+fn begin(mapping: &Mapping, proposals: &mut Proposals, out: &mut Contributions, w: &mut Arrays) {
     proposals.begin(&mut w.live);
     proposals.draw(0, &w.live);
     if let Some(block) = mapping.layout().light_choices() {
@@ -223,7 +231,7 @@ fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut 
     w.kept.clear();
     w.kept.resize(lanes, 0);
     w.mixtures.clear();
-    if HOW == ONE {
+    if w.how == How::One {
         w.chosen.resize(lanes, Chosen::NONE);
     }
     for &lane in &w.live {
@@ -231,11 +239,11 @@ fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut 
         let [x, y, u, v] = proposals.block(0, at).map(unit_f32);
         (w.film[at], w.lens[at]) = ([x, y], [u, v]);
         out.elsewhere.clear(at);
-        if HOW == OPEN {
+        if w.how == How::Open {
             out.outcomes.clear(at);
             out.lanes[at] = Contribution { film: [x, y], ..Contribution::NONE };
         }
-        if HOW == ONE
+        if w.how == How::One
             && let Some(block) = mapping.layout().light_choices()
         {
             w.chosen[at] = mapping.lengths().choose(proposals.block(block, at));
@@ -244,7 +252,7 @@ fn begin<const HOW: u8>(mapping: &Mapping, proposals: &mut Proposals, out: &mut 
 }
 
 /// Light subpaths: connects their vertices to the lens and keeps those that will be joined.
-fn follow_light<P: Profile, const HOW: u8>(
+fn follow_light<P: Profile>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -252,7 +260,7 @@ fn follow_light<P: Profile, const HOW: u8>(
     w: &mut Arrays,
 ) {
     let (scene, layout) = (mapping.scene(), mapping.layout());
-    start_at_light::<P, HOW>(mapping, proposals, out, tracing, w);
+    start_at_light::<P>(mapping, proposals, out, tracing, w);
     // a path through vertex number j has an edge more, to the lens
     for j in 1..layout.max_depth() {
         if w.lanes.is_empty() {
@@ -262,13 +270,13 @@ fn follow_light<P: Profile, const HOW: u8>(
         keep_hits(w);
         proposals.draw(layout.light_bounce(j - 1), &w.hit_lanes);
         w.waiting.clear();
-        scatter_light::<P, HOW>(mapping, j, proposals, w);
-        splat::<HOW>(mapping, tracing, w, out);
+        scatter_light::<P>(mapping, j, proposals, w);
+        splat(mapping, tracing, w, out);
     }
 }
 
 /// Starts a light subpath in every lane that has one, and connects the place where it starts to the lens.
-fn start_at_light<P: Profile, const HOW: u8>(
+fn start_at_light<P: Profile>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -276,7 +284,7 @@ fn start_at_light<P: Profile, const HOW: u8>(
     w: &mut Arrays,
 ) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
-    begin_subpaths::<HOW>(w, |chosen| chosen.light > 1);
+    begin_subpaths(w, |chosen| chosen.light > 1);
     proposals.draw(layout.emission(), &w.lanes);
     w.particles.clear();
     w.emissions.clear();
@@ -299,14 +307,14 @@ fn start_at_light<P: Profile, const HOW: u8>(
     }
     w.lanes.truncate(kept);
     if techniques.lamp {
-        splat::<HOW>(mapping, tracing, w, out);
+        splat(mapping, tracing, w, out);
     }
 }
 
 /// Lists the lanes that have a subpath of one kind, all of them where points do not choose, and forgets old rays.
-fn begin_subpaths<const HOW: u8>(w: &mut Arrays, has: impl Fn(&Chosen) -> bool) {
+fn begin_subpaths(w: &mut Arrays, has: impl Fn(&Chosen) -> bool) {
     w.lanes.clear();
-    w.lanes.extend(w.live.iter().filter(|lane| HOW != ONE || has(&w.chosen[**lane as usize])));
+    w.lanes.extend(w.live.iter().filter(|lane| w.how != How::One || has(&w.chosen[**lane as usize])));
     w.rays.clear();
     w.steps.resize(w.live.len(), Step::NOWHERE);
 }
@@ -332,15 +340,15 @@ fn keep_hits(w: &mut Arrays) {
 }
 
 /// At every hit of a light subpath: the lens to connect to, and the next edge, which replaces the one that led here.
-fn scatter_light<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
-    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * proposals.lanes() };
+fn scatter_light<P: Profile>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) {
+    let row = if w.how == How::One { 0 } else { usize::from(j - 1) * proposals.lanes() };
     if mapping.kind().techniques().inner && w.vertices.len() < row + proposals.lanes() {
         w.vertices.resize(row + proposals.lanes(), LightVertex::NOWHERE);
     }
     let kept = if P::FLAT_MESHES && !P::VARYING {
-        side_by_side::light::scatter_light::<P, HOW>(mapping, j, proposals, w)
+        side_by_side::light::scatter_light::<P>(mapping, j, proposals, w)
     } else {
-        w.at_each_hit(|w, hit, kept| scatter_light_one::<P, HOW>(mapping, j, proposals, w, hit, kept))
+        w.at_each_hit(|w, hit, kept| scatter_light_one::<P>(mapping, j, proposals, w, hit, kept))
     };
     w.lanes.truncate(kept);
     w.particles.truncate(kept);
@@ -349,7 +357,7 @@ fn scatter_light<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, proposals
 
 /// At one hit; returns how many subpaths have gone on then, `kept` before.
 #[inline(always)]
-fn scatter_light_one<P: Profile, const HOW: u8>(
+fn scatter_light_one<P: Profile>(
     mapping: &Mapping,
     j: u16,
     proposals: &Proposals,
@@ -369,14 +377,14 @@ fn scatter_light_one<P: Profile, const HOW: u8>(
         particle.arrive_after(&w.steps[i], origin, direction, &surface)
     };
     let site = Site::of(&surface);
-    let last = is_last::<HOW>(w, lane, j);
-    if HOW != ONE || last && w.chosen[at].camera == 1 {
+    let last = is_last(w, lane, j);
+    if w.how != How::One || last && w.chosen[at].camera == 1 {
         let seen = connections::to_camera::<P>(scene, techniques, &arrival, &site, w.lens[at], j);
         if let Some(seen) = seen {
-            add_splat::<HOW>(mapping, j, w, lane, seen, arrival.survival);
+            add_splat(mapping, j, w, lane, seen, arrival.survival);
         }
     }
-    if techniques.inner && (HOW != ONE || last && w.chosen[at].camera > 1) {
+    if techniques.inner && (w.how != How::One || last && w.chosen[at].camera > 1) {
         let mixture = match &surface.scattering {
             Scattering::Plain(_) => PLAIN,
             Scattering::Mixed(mixture) => {
@@ -384,13 +392,13 @@ fn scatter_light_one<P: Profile, const HOW: u8>(
                 w.mixtures.len() as u32 - 1
             }
         };
-        keep_vertex::<HOW>(j, proposals, w, lane, LightVertex::new(&surface, mixture, &arrival));
+        keep_vertex(j, proposals, w, lane, LightVertex::new(&surface, mixture, &arrival));
     }
     if last || j + 1 == layout.max_depth() {
         return kept;
     }
     let block = proposals.block(layout.light_bounce(j - 1), at);
-    let decisions = Decisions::of_light(layout, j - 1, block, HOW != ONE);
+    let decisions = Decisions::of_light(layout, j - 1, block, w.how != How::One);
     let Some(edge) = subpath::scatter_light::<P>(&site, &arrival, &decisions, techniques, j) else { return kept };
     w.go_on_from_light(kept, lane, &edge);
     kept + 1
@@ -398,39 +406,39 @@ fn scatter_light_one<P: Profile, const HOW: u8>(
 
 /// Whether a light subpath is as long as its point chose when it has come to its vertex number `j`.
 #[inline(always)]
-fn is_last<const HOW: u8>(w: &Arrays, lane: u32, j: u16) -> bool {
-    HOW == ONE && w.chosen[lane as usize].light == j + 1
+fn is_last(w: &Arrays, lane: u32, j: u16) -> bool {
+    w.how == How::One && w.chosen[lane as usize].light == j + 1
 }
 
 /// Keeps what is seen of a lane's vertex number `j` for its shadow ray; roulette has let the subpath come so far with
 /// the probability `survival`.
 #[inline(always)]
-fn add_splat<const HOW: u8>(mapping: &Mapping, j: u16, w: &mut Arrays, lane: u32, mut seen: Seen, survival: f32) {
-    if HOW == ONE {
+fn add_splat(mapping: &Mapping, j: u16, w: &mut Arrays, lane: u32, mut seen: Seen, survival: f32) {
+    if w.how == How::One {
         seen.connection.contribution *= w.chosen[lane as usize].scale;
     }
     w.waiting.add_splat(lane, &seen);
-    if HOW == OPEN {
+    if w.how == How::Open {
         w.waiting.chances.push(mapping.lengths().chance(j + 1, 1) / survival);
     }
 }
 
 /// Keeps a lane's vertex number `j`, to be joined with camera subpaths.
 #[inline(always)]
-fn keep_vertex<const HOW: u8>(j: u16, proposals: &Proposals, w: &mut Arrays, lane: u32, vertex: LightVertex) {
-    let row = if HOW == ONE { 0 } else { usize::from(j - 1) * proposals.lanes() };
+fn keep_vertex(j: u16, proposals: &Proposals, w: &mut Arrays, lane: u32, vertex: LightVertex) {
+    let row = if w.how == How::One { 0 } else { usize::from(j - 1) * proposals.lanes() };
     w.vertices[row + lane as usize] = vertex;
-    w.kept[lane as usize] = if HOW == ONE { 1 } else { j };
+    w.kept[lane as usize] = if w.how == How::One { 1 } else { j };
 }
 
 /// Traces the shadow rays of splats and puts those that are seen onto the lists of their lanes.
-fn splat<const HOW: u8>(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays, out: &mut Contributions) {
+fn splat(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays, out: &mut Contributions) {
     let waiting = &mut w.waiting;
     waiting.trace(mapping, tracing, out);
     for i in waiting.seen() {
         let splat = FilmSplat { film: waiting.films[i], rgb: waiting.contributions[i] };
         let lane = waiting.lanes[i] as usize;
-        if HOW == OPEN {
+        if w.how == How::Open {
             out.outcomes.push(lane, Outcome { splat, own: false, chance: waiting.chances[i], ..Outcome::default() });
         } else {
             out.elsewhere.push(lane, splat);
@@ -439,7 +447,7 @@ fn splat<const HOW: u8>(mapping: &Mapping, tracing: &mut Tracing, w: &mut Arrays
 }
 
 /// Camera subpaths: emission, next-event estimation and the vertices of light subpaths at each of their vertices.
-fn follow_camera<P: Profile, const HOW: u8>(
+fn follow_camera<P: Profile>(
     mapping: &Mapping,
     proposals: &mut Proposals,
     out: &mut Contributions,
@@ -447,14 +455,14 @@ fn follow_camera<P: Profile, const HOW: u8>(
     w: &mut Arrays,
 ) {
     let (scene, layout) = (mapping.scene(), mapping.layout());
-    start_at_camera::<HOW>(mapping, w);
+    start_at_camera(mapping, w);
     for j in 1..=layout.max_depth() {
         if w.lanes.is_empty() {
             break;
         }
         let kind = if j == 1 { Kind::Camera } else { Kind::Bounce };
         tracing.closest(scene, mapping.widths(), kind, &w.rays, &mut w.hits, out);
-        collect_background::<P, HOW>(mapping, j, w, out);
+        collect_background::<P>(mapping, j, w, out);
         keep_hits(w);
         if j < layout.max_depth() {
             proposals.draw(layout.bounce(j - 1), &w.hit_lanes);
@@ -463,11 +471,11 @@ fn follow_camera<P: Profile, const HOW: u8>(
             }
         }
         w.waiting.clear();
-        scatter_camera::<P, HOW>(mapping, j, proposals, w, out);
+        scatter_camera::<P>(mapping, j, proposals, w, out);
         w.waiting.trace(mapping, tracing, out);
         for i in w.waiting.seen() {
             let (at, rgb) = (w.waiting.lanes[i] as usize, w.waiting.contributions[i]);
-            if HOW == OPEN {
+            if w.how == How::Open {
                 out.outcomes.push(at, outcome(w.film[at], rgb, w.waiting.chances[i]));
             } else {
                 w.radiance[at] += rgb;
@@ -477,8 +485,8 @@ fn follow_camera<P: Profile, const HOW: u8>(
 }
 
 /// Starts a camera subpath in every lane that has one.
-fn start_at_camera<const HOW: u8>(mapping: &Mapping, w: &mut Arrays) {
-    begin_subpaths::<HOW>(w, |chosen| chosen.camera > 1);
+fn start_at_camera(mapping: &Mapping, w: &mut Arrays) {
+    begin_subpaths(w, |chosen| chosen.camera > 1);
     w.carried.clear();
     w.specular.clear();
     w.specular.resize(w.lanes.len(), true);
@@ -490,36 +498,36 @@ fn start_at_camera<const HOW: u8>(mapping: &Mapping, w: &mut Arrays) {
 }
 
 /// Adds the background to the paths that left the scene by their edge number `j`.
-fn collect_background<P: Profile, const HOW: u8>(mapping: &Mapping, j: u16, w: &mut Arrays, out: &mut Contributions) {
+fn collect_background<P: Profile>(mapping: &Mapping, j: u16, w: &mut Arrays, out: &mut Contributions) {
     if P::FLAT_MESHES || mapping.scene().emitters.surrounding_light().is_none() {
         return;
     }
     for i in 0..w.lanes.len() {
         let at = w.lanes[i] as usize;
-        if w.hits.geometry[i] != MISS || HOW == ONE && !w.chosen[at].is(0, j + 1) {
+        if w.hits.geometry[i] != MISS || w.how == How::One && !w.chosen[at].is(0, j + 1) {
             continue;
         }
-        if HOW != SUM && mapping.views_left_open() && w.specular[i] {
+        if w.how != How::Sum && mapping.views_left_open() && w.specular[i] {
             continue;
         }
         let tail = if j == 1 { subpath::STRAIGHT_OUT } else { w.steps[i].arrive_at_infinity() };
         let end = CameraEnd { carried: w.carried[i], tail };
         let techniques = mapping.kind().techniques();
         let radiance = connections::background::<P>(mapping.scene(), techniques, w.rays.direction(i), &end, j);
-        if HOW == OPEN {
+        if w.how == How::Open {
             if radiance != Rgb::ZERO {
                 let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
                 out.outcomes.push(at, outcome(w.film[at], radiance, chance));
             }
         } else {
-            w.radiance[at] += if HOW == ONE { radiance * w.chosen[at].scale } else { radiance };
+            w.radiance[at] += if w.how == How::One { radiance * w.chosen[at].scale } else { radiance };
         }
     }
 }
 
 /// At every hit of a camera subpath, its vertex number `j`: emission, connections, and the next edge, which replaces the
 /// one that led here.
-fn scatter_camera<P: Profile, const HOW: u8>(
+fn scatter_camera<P: Profile>(
     mapping: &Mapping,
     j: u16,
     proposals: &Proposals,
@@ -527,9 +535,9 @@ fn scatter_camera<P: Profile, const HOW: u8>(
     out: &mut Contributions,
 ) {
     let kept = if P::FLAT_MESHES && !P::VARYING {
-        side_by_side::camera::scatter_camera::<P, HOW>(mapping, j, proposals, w, out)
+        side_by_side::camera::scatter_camera::<P>(mapping, j, proposals, w, out)
     } else {
-        w.at_each_hit(|w, hit, kept| scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, hit, kept))
+        w.at_each_hit(|w, hit, kept| scatter_camera_one::<P>(mapping, j, proposals, w, out, hit, kept))
     };
     w.lanes.truncate(kept);
     w.carried.truncate(kept);
@@ -539,7 +547,7 @@ fn scatter_camera<P: Profile, const HOW: u8>(
 
 /// At one hit; returns how many subpaths have gone on then, `kept` before.
 #[inline(always)]
-fn scatter_camera_one<P: Profile, const HOW: u8>(
+fn scatter_camera_one<P: Profile>(
     mapping: &Mapping,
     j: u16,
     proposals: &Proposals,
@@ -561,7 +569,7 @@ fn scatter_camera_one<P: Profile, const HOW: u8>(
     };
     let end = CameraEnd { carried: w.carried[i], tail };
     if surface.light != NO_LIGHT {
-        collect_hit::<P, HOW>(mapping, j, w, out, [slot, lane], &surface, &end);
+        collect_hit::<P>(mapping, j, w, out, [slot, lane], &surface, &end);
     }
     if j == layout.max_depth() {
         return kept;
@@ -569,16 +577,16 @@ fn scatter_camera_one<P: Profile, const HOW: u8>(
     let choices = layout.choices(bounce).map(|block| proposals.block(block, at));
     let mut decisions = Decisions::new(layout, bounce, proposals.block(layout.bounce(bounce), at), choices);
     let site = Site::of(&surface);
-    if HOW != ONE || w.chosen[at].is(1, j + 1) {
+    if w.how != How::One || w.chosen[at].is(1, j + 1) {
         let connection = connections::next_event::<P>(scene, techniques, &site, &end, &decisions, j);
         if let Some(connection) = connection {
-            add_connection::<HOW>(mapping, w, lane, connection, [1, j + 1], end.carried.survival);
+            add_connection(mapping, w, lane, connection, [1, j + 1], end.carried.survival);
         }
     }
     if site.scattering.is_smooth::<P>() {
-        join::<P, HOW>(mapping, j, proposals, w, lane, &end, &site);
+        join::<P>(mapping, j, proposals, w, lane, &end, &site);
     }
-    if HOW == ONE {
+    if w.how == How::One {
         if w.chosen[at].camera == j + 1 {
             return kept;
         }
@@ -592,7 +600,7 @@ fn scatter_camera_one<P: Profile, const HOW: u8>(
 }
 
 /// Adds what a light sends to a camera subpath that hit it with its edge number `j`.
-fn collect_hit<P: Profile, const HOW: u8>(
+fn collect_hit<P: Profile>(
     mapping: &Mapping,
     j: u16,
     w: &mut Arrays,
@@ -602,26 +610,26 @@ fn collect_hit<P: Profile, const HOW: u8>(
     end: &CameraEnd,
 ) {
     let (i, at) = (slot as usize, lane as usize);
-    let left_open = HOW != SUM && mapping.views_left_open() && w.specular[i];
-    if left_open || HOW == ONE && !w.chosen[at].is(0, j + 1) {
+    let left_open = w.how != How::Sum && mapping.views_left_open() && w.specular[i];
+    if left_open || w.how == How::One && !w.chosen[at].is(0, j + 1) {
         return;
     }
     let edge = (w.rays.origin(i), w.rays.direction(i));
     let radiance = connections::hit::<P>(mapping.scene(), mapping.kind().techniques(), surface, edge, end, j);
-    if HOW == OPEN {
+    if w.how == How::Open {
         if radiance != Rgb::ZERO {
             let chance = mapping.lengths().chance(0, j + 1) / end.carried.survival;
             out.outcomes.push(at, outcome(w.film[at], radiance, chance));
         }
     } else {
-        w.radiance[at] += if HOW == ONE { radiance * w.chosen[at].scale } else { radiance };
+        w.radiance[at] += if w.how == How::One { radiance * w.chosen[at].scale } else { radiance };
     }
 }
 
 /// Keeps a connection by the technique (s, t) for its shadow ray; roulette has let both subpaths come so far with the
 /// probability `survival`.
 #[inline(always)]
-fn add_connection<const HOW: u8>(
+fn add_connection(
     mapping: &Mapping,
     w: &mut Arrays,
     lane: u32,
@@ -629,18 +637,18 @@ fn add_connection<const HOW: u8>(
     [s, t]: [u16; 2],
     survival: f32,
 ) {
-    if HOW == ONE {
+    if w.how == How::One {
         connection.contribution *= w.chosen[lane as usize].scale;
     }
     w.waiting.add(lane, &connection);
-    if HOW == OPEN {
+    if w.how == How::Open {
         w.waiting.chances.push(mapping.lengths().chance(s, t) / survival);
     }
 }
 
 /// Connects vertex number `j` of a camera subpath, which scatters smoothly, to all vertices that are kept of the light's.
 #[inline(always)]
-fn join<P: Profile, const HOW: u8>(
+fn join<P: Profile>(
     mapping: &Mapping,
     j: u16,
     proposals: &Proposals,
@@ -651,31 +659,31 @@ fn join<P: Profile, const HOW: u8>(
 ) {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
     let at = lane as usize;
-    if !techniques.inner || w.kept[at] == 0 || HOW == ONE && w.chosen[at].camera != j + 1 {
+    if !techniques.inner || w.kept[at] == 0 || w.how == How::One && w.chosen[at].camera != j + 1 {
         return;
     }
     // as many edges as both subpaths have, and the one between
-    let longest = if HOW == ONE { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
+    let longest = if w.how == How::One { 1 } else { w.kept[at].min(layout.max_depth() - j - 1) };
     for i in 1..=longest {
         let vertex = &w.vertices[usize::from(i - 1) * proposals.lanes() + at];
         let light = vertex.site::<P>(scene, &w.mixtures);
-        let number = if HOW == ONE { w.chosen[at].light - 1 } else { i };
+        let number = if w.how == How::One { w.chosen[at].light - 1 } else { i };
         let survival = vertex.arrival.survival * end.carried.survival;
         let ends = ((&vertex.arrival, &light, number), (end, site, j));
         if let Some(connection) = connections::join::<P>(techniques, ends.0, ends.1) {
-            add_connection::<HOW>(mapping, w, lane, connection, [i + 1, j + 1], survival);
+            add_connection(mapping, w, lane, connection, [i + 1, j + 1], survival);
         }
     }
 }
 
 /// Turns radiances and splats into contributions and settles those that are not finite.
-fn settle<const HOW: u8>(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
+fn settle(proposals: &Proposals, w: &Arrays, out: &mut Contributions) {
     for (lane, m) in proposals.moves.iter().enumerate() {
         if *m != Move::Rest {
             let (contribution, causes) =
                 Contribution::settle_whole(w.film[lane], w.radiance[lane], &mut out.elsewhere, lane);
             out.lanes[lane] = contribution;
-            if HOW == ONE && w.chosen[lane].scale > 0.0 {
+            if w.how == How::One && w.chosen[lane].scale > 0.0 {
                 out.lanes[lane].chance = 1.0 / w.chosen[lane].scale;
             }
             if !causes.is_none() {

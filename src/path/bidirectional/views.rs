@@ -6,7 +6,7 @@
 //! of the light in a few pixels of two balls.) So they are left to open points, and these look several times, as a look has a ray
 //! or two where a point with all its connections has fifty.
 
-use super::{Arrays, OPEN, keep_hits, outcome, start_at_camera};
+use super::{Arrays, keep_hits, outcome, start_at_camera};
 use crate::{
     embree::MISS,
     path::{
@@ -42,7 +42,7 @@ pub(super) fn look<P: Profile>(
             let [x, y, u, v] = proposals.beside(at, in_cell(number, words(lane, 0))).map(unit_f32);
             (w.film[at], w.lens[at]) = ([x, y], [u, v]);
         }
-        start_at_camera::<OPEN>(mapping, w);
+        start_at_camera(mapping, w);
         for j in 1..=mapping.layout().max_depth() {
             if w.lanes.is_empty() {
                 break;

@@ -4,7 +4,7 @@ use pulp::NullaryFnOnce;
 
 use super::{
     super::{
-        Arrays, CameraEnd, ONE, Site, add_connection, collect_hit, connections, join, scatter_camera_one, subpath,
+        Arrays, CameraEnd, How, Site, add_connection, collect_hit, connections, join, scatter_camera_one, subpath,
         weights,
     },
     Arrivals, Departures,
@@ -59,7 +59,7 @@ pub struct Group {
 
 /// At every hit of a camera subpath, its vertex number `j`: emission, connections, and the next edge, which replaces the one
 /// that led here. Returns how many subpaths go on.
-pub fn scatter_camera<P: Profile, const HOW: u8>(
+pub fn scatter_camera<P: Profile>(
     mapping: &Mapping,
     j: u16,
     proposals: &Proposals,
@@ -72,7 +72,7 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
     let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes));
     let goes_on = j < layout.max_depth();
     let lit = scene.features.lights() > 0;
-    let roulette = HOW != ONE && layout.roulette(j - 1);
+    let roulette = w.how != How::One && layout.roulette(j - 1);
     let compared = techniques.has(2, j);
     debug_assert!(techniques.hit && techniques.next_event && techniques.light, "weights that leave one of them out");
     let mut kept = 0;
@@ -85,13 +85,13 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
             g.shines[k] = u32::from(side.light != NO_LIGHT);
         }
         if goes_on {
-            let looks = fetch_choices::<HOW>(mapping, j, w, proposals, lanes, lit, g);
-            let scatters = HOW != ONE || lanes.iter().any(|lane| w.chosen[*lane as usize].camera != j + 1);
+            let looks = fetch_choices(mapping, j, w, proposals, lanes, lit, g);
+            let scatters = w.how != How::One || lanes.iter().any(|lane| w.chosen[*lane as usize].camera != j + 1);
             widest(Leave { g, looks, scatters, roulette, compared });
         }
         for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
             if !g.ends.is_diffuse::<P>(k) {
-                kept = scatter_camera_one::<P, HOW>(mapping, j, proposals, w, out, [slot, lane], kept);
+                kept = scatter_camera_one::<P>(mapping, j, proposals, w, out, [slot, lane], kept);
                 continue;
             }
             if g.shines[k] == 1 {
@@ -99,18 +99,18 @@ pub fn scatter_camera<P: Profile, const HOW: u8>(
                 let hit = w.hits.get(i).expect("misses are gone");
                 let surface = scene.surface::<P>(hit, w.rays.origin(i), w.rays.direction(i));
                 let end = CameraEnd { carried: w.carried[i], tail };
-                collect_hit::<P, HOW>(mapping, j, w, out, [slot, lane], &surface, &end);
+                collect_hit::<P>(mapping, j, w, out, [slot, lane], &surface, &end);
             }
             if !goes_on {
                 continue;
             }
-            let chosen = (HOW == ONE).then(|| w.chosen[lane as usize]);
+            let chosen = (w.how == How::One).then(|| w.chosen[lane as usize]);
             if lit && g.connections.any(k) && chosen.is_none_or(|chosen| chosen.is(1, j + 1)) {
-                add_connection::<HOW>(mapping, w, lane, g.connections.get(k), [1, j + 1], g.survival[k]);
+                add_connection(mapping, w, lane, g.connections.get(k), [1, j + 1], g.survival[k]);
             }
             if techniques.inner {
                 let end = CameraEnd { carried: g.carried(k), tail: g.arrivals.tail.get(k) };
-                join::<P, HOW>(mapping, j, proposals, w, lane, &end, &g.site(k, scene));
+                join::<P>(mapping, j, proposals, w, lane, &end, &g.site(k, scene));
             }
             if g.next.any(k) && chosen.is_none_or(|chosen| chosen.camera != j + 1) {
                 w.go_on_from_camera(kept, [slot, lane], &g.edge(k), g.departures.step.get(k));
@@ -181,7 +181,7 @@ fn see(camera: &Camera, eye: Eye, g: &mut Group) {
 
 /// Fetches the primary samples and the triangles of lights that they choose; whether any lane looks at one.
 #[inline(always)]
-fn fetch_choices<const HOW: u8>(
+fn fetch_choices(
     mapping: &Mapping,
     j: u16,
     w: &Arrays,
@@ -198,7 +198,7 @@ fn fetch_choices<const HOW: u8>(
         let choices = choices.map(|block| proposals.block(block, at));
         let decisions = Decisions::new(layout, bounce, proposals.block(first, at), choices);
         g.choices.set(k, &decisions);
-        if lit && (HOW != ONE || w.chosen[at].is(1, j + 1)) {
+        if lit && (w.how != How::One || w.chosen[at].is(1, j + 1)) {
             g.aims.fetch(k, scene, decisions.light_place, decisions.light);
             looks = true;
         }

@@ -5,7 +5,7 @@ use pulp::NullaryFnOnce;
 
 use super::{
     super::{
-        Arrays, LightVertex, ONE, Seen, add_splat, connections, is_last, keep_vertex, scatter_light_one, subpath,
+        Arrays, How, LightVertex, Seen, add_splat, connections, is_last, keep_vertex, scatter_light_one, subpath,
         subpath::{Arrival, LightEdge, Particle},
         weights,
     },
@@ -54,19 +54,14 @@ pub struct Group {
 
 /// At every hit of a light subpath, its vertex number `j`: the lens to connect to, and the next edge, which replaces the one
 /// that led here.
-pub fn scatter_light<P: Profile, const HOW: u8>(
-    mapping: &Mapping,
-    j: u16,
-    proposals: &Proposals,
-    w: &mut Arrays,
-) -> usize {
+pub fn scatter_light<P: Profile>(mapping: &Mapping, j: u16, proposals: &Proposals, w: &mut Arrays) -> usize {
     let (scene, layout, techniques) = (mapping.scene(), mapping.layout(), mapping.kind().techniques());
     // the group and the lists are lent out while the other arrays are written to
     let mut group = w.light_group.take().unwrap_or_default();
     let (slots, lanes) = (std::mem::take(&mut w.hit_slots), std::mem::take(&mut w.hit_lanes));
     let weighs = techniques.weigh();
     let weighed = weighs.then(|| techniques.has(j, 2));
-    let roulette = HOW != ONE && layout.roulette(j - 1);
+    let roulette = w.how != How::One && layout.roulette(j - 1);
     let goes_on = j + 1 < layout.max_depth();
     let mut kept = 0;
     for (slots, lanes) in slots.chunks(N).zip(lanes.chunks(N)) {
@@ -77,21 +72,21 @@ pub fn scatter_light<P: Profile, const HOW: u8>(
             g.ends.fetch_side::<P>(k, scene, &w.hits, slot as usize);
         }
         fetch_choices(mapping, j, w, proposals, lanes, g);
-        let last = |lane: &&u32| is_last::<HOW>(w, **lane, j);
-        let looks = HOW != ONE || lanes.iter().filter(last).any(|lane| w.chosen[*lane as usize].camera == 1);
-        let goes_on = goes_on && !lanes.iter().all(|lane| is_last::<HOW>(w, *lane, j));
+        let last = |lane: &&u32| is_last(w, **lane, j);
+        let looks = w.how != How::One || lanes.iter().filter(last).any(|lane| w.chosen[*lane as usize].camera == 1);
+        let goes_on = goes_on && !lanes.iter().all(|lane| is_last(w, *lane, j));
         widest(Leave { g, camera: &scene.camera, looks, weighed, roulette, goes_on });
         for (k, (&slot, &lane)) in slots.iter().zip(lanes).enumerate() {
             if !g.ends.is_diffuse::<P>(k) {
-                kept = scatter_light_one::<P, HOW>(mapping, j, proposals, w, [slot, lane], kept);
+                kept = scatter_light_one::<P>(mapping, j, proposals, w, [slot, lane], kept);
                 continue;
             }
-            let last = is_last::<HOW>(w, lane, j);
-            if g.connections.any(k) && (HOW != ONE || last && w.chosen[lane as usize].camera == 1) {
-                add_splat::<HOW>(mapping, j, w, lane, g.splat(k), g.survival[k]);
+            let last = is_last(w, lane, j);
+            if g.connections.any(k) && (w.how != How::One || last && w.chosen[lane as usize].camera == 1) {
+                add_splat(mapping, j, w, lane, g.splat(k), g.survival[k]);
             }
-            if techniques.inner && (HOW != ONE || last && w.chosen[lane as usize].camera > 1) {
-                keep_vertex::<HOW>(j, proposals, w, lane, g.vertex(k));
+            if techniques.inner && (w.how != How::One || last && w.chosen[lane as usize].camera > 1) {
+                keep_vertex(j, proposals, w, lane, g.vertex(k));
             }
             if goes_on && !last && g.next.any(k) {
                 w.go_on_from_light(kept, lane, &g.edge(k));
