@@ -54,7 +54,7 @@ fn paths_from_both_ends_are_what_mitsuba_makes_of_them() {
 
 #[test]
 fn one_technique_a_point_gives_what_mitsuba_makes_of_all() {
-    // each technique is that of the bidirectional mapping: what is to be seen is that all of them are chosen
+    // what each technique gives is tested by the bidirectional mapping on all scenes
     let names = ["crop", "glass", "mixtures", "picture-lights", "principled-varied", "sky", "spots", "thin-lens"];
     check_with("multiplexed", &with(Method::Path, MappingKind::Multiplexed, 512.0), 0.02, &names);
 }
